@@ -1,0 +1,103 @@
+#pragma once
+
+#include <peat/base/parameters.h>
+#include <peat/base/registry.h>
+#include <peat/condition/nodal_fields.h>
+#include <peat/grid/shape.h>
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace peat {
+/// Where a condition acts: faces of the mesh, a region of nodes, or the surface of a body (or its part that looks in
+/// one direction).
+template <int dim>
+struct Place
+{
+  Place(Section section, const std::vector<std::string> &body_names);
+
+  std::vector<unsigned int> boundaries; ///< ids of mesh faces
+  std::string body;                     ///< whose surface; "" if none
+  int direction = -1;                   ///< of that surface, numbered like mesh faces; -1 for all of it
+  std::shared_ptr<const Shape<dim>> region; ///< nodes, or the part of the surface, inside; nullptr for no restriction
+
+  bool on_mesh() const { return body.empty(); }
+  bool contains(const SurfacePoint<dim> &point) const;
+};
+
+/// A boundary condition or load. It sees nodal fields and never points; it acts where it overrides a stage of the step.
+template <int dim>
+class Condition
+{
+public:
+  Condition(Section section, Place<dim> place) : section(section), place(std::move(place)), name(section.name()) {}
+  virtual ~Condition() = default;
+
+  /// Whose surface it needs, or "".
+  const std::string &surface_of() const { return place.body; }
+
+  /// Remake lists of nodes; called when the set of active nodes has changed.
+  virtual void select(const ActiveNodes<dim> &nodes);
+
+  /// Add to `force` or `pressure_load`, each rank for its own part.
+  virtual void add_loads(const ActiveNodes<dim> &, const Surface<dim> &, NodalFields<dim> &) const {}
+  /// Prescribe `velocity`, `acceleration` (of the start) and new velocities.
+  virtual void constrain_motion(const ActiveNodes<dim> &, NodalFields<dim> &) const {}
+  /// Prescribe another velocity field than `new_velocity` in the same way (re-mapped velocities).
+  virtual void constrain_velocity(const ActiveNodes<dim> &, double /*end_time*/, double /*dt*/,
+                                  std::vector<double> & /*velocity*/) const
+  {
+  }
+  /// Prescribe `flux`.
+  virtual void constrain_flux(const ActiveNodes<dim> &, const Surface<dim> &, NodalFields<dim> &) const {}
+  /// Mesh faces for which this condition replaces the default, an impermeable wall.
+  virtual std::vector<unsigned int> opened_boundaries() const { return {}; }
+  /// Whether it makes sense without any saturated body.
+  virtual bool concerns_fluid() const { return false; }
+
+  const Section section;
+  const Place<dim> place;
+  const std::string name;
+
+protected:
+  /// Active nodes on the mesh faces and in the region of `place`, per mesh face (region only: one list).
+  struct Selection
+  {
+    int boundary; ///< -1: a region
+    std::vector<std::uint32_t> nodes;
+  };
+  std::vector<Selection> selections;
+};
+
+/// Reads one subsection of `Conditions`.
+template <int dim>
+std::unique_ptr<Condition<dim>> make_condition(Section section, const std::vector<std::string> &body_names);
+
+/// A member of the family of conditions: one .cc, one line
+///   const ConditionMember<Roller> member("roller", "Sentence.");
+template <int dim>
+struct ConditionEntry
+{
+  std::string text;
+  std::function<std::unique_ptr<Condition<dim>>(const Section &, const Place<dim> &)> make;
+};
+
+template <int dim>
+std::map<std::string, ConditionEntry<dim>> &condition_family();
+
+template <template <int> class Member>
+struct ConditionMember
+{
+  ConditionMember(const std::string &name, const std::string &text)
+  {
+    condition_family<2>()[name] = {text, [](const Section &s, const Place<2> &p) -> std::unique_ptr<Condition<2>> {
+                                     return std::make_unique<Member<2>>(s, p);
+                                   }};
+    condition_family<3>()[name] = {text, [](const Section &s, const Place<3> &p) -> std::unique_ptr<Condition<3>> {
+                                     return std::make_unique<Member<3>>(s, p);
+                                   }};
+  }
+};
+} // namespace peat

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <peat/material/material.h>
+
+#include <string>
+#include <vector>
+
+namespace peat {
+/// How many columns a law may remember.
+constexpr unsigned int max_state_columns = 32;
+
+/// What a scheme needs stored with the points beyond what the material asks for.
+struct SchemeFields
+{
+  bool velocity_gradient = false;
+  bool extent = false;
+};
+
+/// The columns of a body's points: what is stored, under which name, and where in the row of a point. A body stores
+/// only what its material and the scheme use; a column that does not exist has the index -1.
+///
+/// Vectors have dim components. Stress has xx, yy, zz, xy in 2-D and xx, yy, zz, xy, yz, zx in 3-D.
+struct Layout
+{
+  enum class Kind
+  {
+    scalar,
+    vector,
+    stress,
+    other
+  };
+  struct Field
+  {
+    std::string name;
+    std::string unit;
+    int first_column;
+    unsigned int n_components;
+    Kind kind;
+  };
+
+  Layout(unsigned int dim, const Material &material, const SchemeFields &scheme);
+
+  /// Nullptr if there is no field of that name.
+  const Field *find(const std::string &name) const;
+
+  unsigned int n_columns = 0;
+  std::vector<Field> fields;
+
+  int mass = -1;              ///< [kg]
+  int volume = -1;            ///< [m^dim]; per metre of depth in 2-D
+  int velocity = -1;          ///< [m/s]
+  int displacement = -1;      ///< [m] since the start
+  int stress = -1;            ///< effective Cauchy stress [Pa]
+  int pressure = -1;          ///< pore pressure [Pa]; saturated bodies
+  int porosity = -1;          ///< [-]; saturated bodies under finite strain (constant otherwise)
+  int velocity_gradient = -1; ///< [1/s], dim * dim, row by row; affine transfer
+  int extent = -1;            ///< half the edge lengths of the point's domain [m]; GIMP
+  int state = -1;             ///< what the law remembers
+  unsigned int n_state = 0;   ///< number of columns of the law's memory
+
+private:
+  int add(const std::string &name, const std::string &unit, unsigned int n_components, Kind kind);
+};
+} // namespace peat

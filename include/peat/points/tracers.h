@@ -1,0 +1,56 @@
+#pragma once
+
+#include <peat/condition/nodal_fields.h>
+#include <peat/grid/active_nodes.h>
+#include <peat/grid/shape.h>
+
+#include <vector>
+
+namespace peat {
+/// Massless points that move with the material: pieces of a body's surface, on which tractions act, and probes.
+/// Each is handled by one rank.
+template <int dim>
+class Tracers
+{
+public:
+  struct Tracer
+  {
+    std::uint32_t id;
+    dealii::Point<dim> initial_position;
+    dealii::Point<dim> position;
+    dealii::Tensor<1, dim> area; ///< outward normal times area; zero for a probe
+  };
+
+  explicit Tracers(const Grid<dim> &grid) : grid(grid) {}
+
+  /// Put a tracer here if this rank owns the cell it lies in. All ranks call it for all tracers.
+  void add(std::uint32_t id, const dealii::Point<dim> &position, const dealii::Tensor<1, dim> &area);
+  /// Put tracers on the surface of a shape where this rank's cells are, with the given number of pieces per cell and
+  /// direction. Faces that lie on the edge of the mesh are left out.
+  void cover(const Shape<dim> &shape, unsigned int pieces_per_direction);
+
+  /// Find for each tracer the nodes that carry it. A tracer whose own cell holds no material (the surface has risen
+  /// a little above the grid line) is carried by the cell below it.
+  void locate(const ActiveNodes<dim> &nodes);
+  /// As located.
+  const Surface<dim> &surface() const { return carried; }
+  const std::vector<Tracer> &tracers() const { return list; }
+
+  /// Move with the nodal velocity for dt; with `stretch`, areas follow the motion too.
+  void move(const std::vector<double> &velocity, double dt, bool stretch, const ActiveNodes<dim> &nodes);
+
+  /// Whether a tracer of this rank has gone where another rank must carry it.
+  bool leaves_rank() const;
+  /// Hand such tracers over. Collective.
+  void migrate();
+
+private:
+  CellId own_cell(const Tracer &tracer) const;
+  CellId carrier(const Tracer &tracer, const ActiveNodes<dim> &nodes) const;
+
+  const Grid<dim> &grid;
+  std::vector<Tracer> list;
+  Surface<dim> carried;
+  std::vector<CellId> carrier_cell;
+};
+} // namespace peat

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <chrono>
+#include <fstream>
+#include <string>
+
+namespace peat {
+/// What a run tells: lines to log.txt and, unless quiet, to the terminal; a progress line to the terminal alone.
+/// Only rank 0 writes.
+class Log
+{
+public:
+  /// Without a directory there is no log.txt.
+  Log(const std::string &directory, bool is_first_rank, bool quiet);
+  ~Log();
+
+  void line(const std::string &text);
+
+  /// Shown at most twice a second on a terminal, every ten seconds otherwise.
+  void progress(double fraction, double time, unsigned long step, double point_steps_per_second);
+
+private:
+  void end_progress();
+
+  std::ofstream file;
+  const bool active;
+  const bool quiet;
+  const bool terminal;
+  bool progress_shown = false;
+  const std::chrono::steady_clock::time_point start;
+  std::chrono::steady_clock::time_point last_progress;
+};
+
+/// "3 s", "12 min", "1.5 h"
+std::string readable_duration(double seconds);
+/// "1.2 GB"
+std::string readable_bytes(double bytes);
+} // namespace peat

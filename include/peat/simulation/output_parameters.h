@@ -1,0 +1,33 @@
+#pragma once
+
+#include <peat/base/parameters.h>
+
+#include <deal.II/base/point.h>
+
+#include <string>
+#include <vector>
+
+namespace peat {
+/// One subsection of `Probes`: a place where fields are recorded over time in probes.csv.
+template <int dim>
+struct ProbeParameters
+{
+  explicit ProbeParameters(Section section);
+
+  Section section;
+  std::string name;
+  dealii::Point<dim> point;
+  bool follow = true; ///< moves with the material that is there at the start
+};
+
+/// The section `Output`.
+struct OutputParameters
+{
+  explicit OutputParameters(Section section);
+
+  double interval = 0.;            ///< of solution.pvd [s]; 0: start and end of each stage
+  bool pictures = true;            ///< whether solution.pvd is written at all
+  double statistics_interval = 0.; ///< of statistics.csv [s]; 0: 200 lines a stage
+  double probe_interval = 0.;      ///< of probes.csv [s]; 0: as statistics
+};
+} // namespace peat

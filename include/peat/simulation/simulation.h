@@ -1,0 +1,80 @@
+#pragma once
+
+#include <peat/simulation/case.h>
+#include <peat/simulation/log.h>
+#include <peat/simulation/run_options.h>
+#include <peat/simulation/schedule.h>
+#include <peat/simulation/statistics.h>
+#include <peat/solver/explicit_mpm.h>
+#include <peat/solver/totals.h>
+
+#include <memory>
+#include <string>
+
+namespace peat {
+/// The wall-clock time of the parts of a run [s].
+struct WallTimes
+{
+  double setup = 0.;
+  double time_loop = 0.; ///< without output
+  double output = 0.;
+};
+
+/// The steps taken so far.
+struct StepRecord
+{
+  unsigned long n_steps = 0;
+  double smallest = std::numeric_limits<double>::infinity();
+  double largest = 0.;
+  double total_time = 0.;
+  std::string limit; ///< what binds the present step
+
+  void add(double dt);
+};
+
+/// Make the bodies, and the tracers that the conditions and probes ask for. Collective.
+template <int dim>
+Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid);
+
+/// Runs the stages of a case and leaves an output directory.
+template <int dim>
+class Simulation
+{
+public:
+  Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options, MPI_Comm communicator);
+  ~Simulation();
+
+  /// Returns false if a signal ended the run early. Throws NumericalError after writing the last state.
+  bool run();
+
+private:
+  struct Outputs;
+  void run_stage(const StageParameters &stage, double start);
+  void report(double time, bool everything);
+  void write_summary() const;
+  bool interrupted();
+
+  Case<dim> &parameters;
+  const RunOptions options;
+  MPI_Comm communicator;
+  const std::string directory;
+  WallTimes wall;
+  Log log;
+  Grid<dim> grid;
+  Scene<dim> scene;
+  std::unique_ptr<ExplicitMPM<dim>> solver;
+  SchemeParameters stage_scheme;
+  std::unique_ptr<Balances<dim>> balances;
+  std::unique_ptr<Outputs> outputs;
+  StepRecord steps;
+  double now = 0.;
+  double planned_end = 0.;
+  bool stopped = false;
+};
+
+/// Asks SIGINT and SIGTERM to end the run at the next step; see Simulation::run().
+void catch_signals();
+
+/// The directory that results go to if none is named.
+std::string default_output_directory(const std::string &file_name);
+} // namespace peat

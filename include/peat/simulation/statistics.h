@@ -1,0 +1,23 @@
+#pragma once
+
+#include <peat/solver/totals.h>
+
+#include <fstream>
+#include <string>
+
+namespace peat {
+/// statistics.csv: one line a report.
+template <int dim>
+class Statistics
+{
+public:
+  /// Only rank 0 opens the file.
+  Statistics(const std::string &directory, bool is_first_rank);
+
+  void write(double time, unsigned long step, double dt, const std::string &limit, const Totals<dim> &totals,
+             const Balances<dim> &balances);
+
+private:
+  std::ofstream file;
+};
+} // namespace peat

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <peat/condition/condition.h>
+#include <peat/points/body.h>
+#include <peat/points/tracers.h>
+#include <peat/solver/scheme.h>
+#include <peat/solver/time_step.h>
+#include <peat/transfer/kernels.h>
+
+#include <deal.II/base/tensor.h>
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace peat {
+/// What has gone into the bodies since the start; one rank's share until it is summed over the ranks.
+template <int dim>
+struct Ledger
+{
+  double external_work = 0.;       ///< of tractions, gravity and prescribed motion [J]
+  double gravity_work = 0.;        ///< of gravity alone [J]
+  double seepage_dissipation = 0.; ///< integral of |w|^2 / kappa [J]
+  double seepage_work = 0.;        ///< all that Darcy's law takes from the fluid's energy p^2 / (2 Q), negative [J]
+  double fluid_outflow = 0.;       ///< of pore fluid through the boundaries [m^dim]
+  double fluid_squeezed = 0.;      ///< pore volume lost by compression that V n does not show (small strain) [m^dim]
+  dealii::Tensor<1, dim> impulse;  ///< of all external forces [N s]
+};
+
+/// The bodies, the conditions on them and the tracers that move with them: what a stage of a run works on.
+template <int dim>
+struct Scene
+{
+  std::vector<std::unique_ptr<Body<dim>>> bodies;
+  std::vector<std::unique_ptr<Condition<dim>>> conditions;
+  /// Surfaces on which conditions act, by body.
+  std::map<std::string, Tracers<dim>> surfaces;
+  std::unique_ptr<Tracers<dim>> probes;
+  Function gravity;
+
+  bool is_saturated() const;
+  dealii::types::particle_index n_global_points() const;
+  Body<dim> &body(const std::string &name) const;
+};
+
+/// The explicit coupled material point method in the u-p form. step() is its table of contents.
+template <int dim>
+class ExplicitMPM
+{
+public:
+  /// `carried` is the ledger of the stages before.
+  ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &scene, double start_time,
+              const Ledger<dim> &carried = {});
+
+  /// Number the nodes that carry material and everything that depends on them. Collective.
+  void prepare();
+
+  /// Advance by dt. Throws NumericalError on every rank if a point is lost or a number is not finite on any.
+  void step(double dt);
+
+  StableStep stable_step() const;
+  double time() const { return now; }
+  /// Correct the round-off of many small steps, where the time is known.
+  void set_time(const double time) { now = time; }
+  double largest_speed() const { return findings.largest_speed; }
+  const ActiveNodes<dim> &nodes() const { return active; }
+  const NodalFields<dim> &fields() const { return nodal; }
+  const Ledger<dim> &ledger() const { return book; }
+
+private:
+  // The stages of a step, in the order of the equations.
+  void points_to_nodes();
+  void add_loads();
+  void solve_momentum();
+  void constrain_motion();
+  void solve_darcy();
+  void nodes_to_points();
+  void book_balances();
+  void move_tracers();
+  void relocate_points();
+
+  void resize_fields();
+  void advance_points_and_remap();
+  dealii::Tensor<1, dim> total_momentum() const;
+  const Surface<dim> &surface(const Condition<dim> &condition) const;
+
+  const SchemeParameters &scheme;
+  const Grid<dim> &grid;
+  Scene<dim> &scene;
+  const bool saturated;
+  const bool has_loads;
+
+  ActiveNodes<dim> active;
+  std::vector<std::unique_ptr<Kernels<dim>>> kernels;
+  NodalFields<dim> nodal;
+  /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
+  std::vector<double> carrying_velocity;
+  /// Nodes and components on impermeable faces of the mesh.
+  std::vector<std::size_t> closed_rows;
+  dealii::Tensor<1, dim> gravity_now;
+
+  double now;
+  StepFindings findings;
+  Ledger<dim> book;
+};
+} // namespace peat

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <peat/solver/explicit_mpm.h>
+
+#include <deal.II/base/tensor.h>
+
+namespace peat {
+/// Sums over all points of all bodies and ranks.
+template <int dim>
+struct Totals
+{
+  double mass = 0.;           ///< [kg]
+  double fluid_volume = 0.;   ///< sum V (n + p/Q) [m^dim]
+  double kinetic_energy = 0.; ///< [J]
+  double elastic_energy = 0.; ///< [J]
+  double fluid_energy = 0.;   ///< sum V p^2 / (2 Q) [J]
+  double largest_speed = 0.;  ///< [m/s]
+  dealii::Tensor<1, dim> momentum;
+  dealii::Tensor<1, dim> center; ///< of mass [m]
+
+  double energy() const { return kinetic_energy + elastic_energy + fluid_energy; }
+};
+
+/// Collective.
+template <int dim>
+Totals<dim> totals(const Scene<dim> &scene, MPI_Comm communicator);
+
+/// Keeps the balances of a run: what the points hold against what the ledger says went in.
+template <int dim>
+class Balances
+{
+public:
+  Balances(const Totals<dim> &start) : start(start) {}
+
+  /// Collective; `ledger` is this rank's share.
+  void update(const Totals<dim> &now, const Ledger<dim> &ledger, MPI_Comm communicator);
+
+  const Ledger<dim> &ledger() const { return book; }
+  /// Relative errors; the largest so far.
+  double mass_error = 0.;
+  double fluid_error = 0.;
+  double momentum_error = 0.;
+  double energy_error = 0.;
+  /// Energy that the scheme took out (positive) or put in [J].
+  double numerical_dissipation = 0.;
+
+private:
+  const Totals<dim> start;
+  Ledger<dim> book;
+  double momentum_scale = 0.;
+  double energy_scale = 0.;
+};
+} // namespace peat

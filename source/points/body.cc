@@ -1,0 +1,257 @@
+#include <peat/grid/cut_box.h>
+#include <peat/points/body.h>
+
+#include <deal.II/base/mpi.h>
+
+#include <numeric>
+#include <sstream>
+
+namespace peat {
+template <int dim>
+BodyParameters<dim>::BodyParameters(Section section, const std::vector<std::string> &material_names)
+    : section(section), name(section.name())
+{
+  constexpr unsigned int n_stress = dim == 2 ? 4 : 6;
+  material = material_names.empty() ? "" : material_names.front();
+  std::string shape_text = dim == 2 ? "box(0, 0, 1, 1)" : "box(0, 0, 0, 1, 1, 1)";
+  const std::string zeros_vector = dim == 2 ? "0, 0" : "0, 0, 0";
+  const std::string zeros_stress = dim == 2 ? "0, 0, 0, 0" : "0, 0, 0, 0, 0, 0";
+  initial_velocity = Function(zeros_vector, {}, {});
+  initial_stress = Function(zeros_stress, {}, {});
+  initial_pressure = Function("0", {}, {});
+
+  section.add("Material", material, material_names, "The material it is made of.");
+  section.add("Shape", shape_text, "Its region at the start: box, ball, polygon, ..., combined by union, intersection, "
+                                   "difference (see the user guide).");
+  section.add("Points per cell", points_per_direction, between(1, 16), "Material points per cell in each direction.");
+  section.add("Initial velocity", initial_velocity, dim, "m/s", "Velocity at the start.");
+  section.add("Initial stress", initial_stress, n_stress, "Pa",
+              dim == 2 ? "Effective stress at the start: xx, yy, zz, xy; tension positive."
+                       : "Effective stress at the start: xx, yy, zz, xy, yz, zx; tension positive.");
+  section.add("Initial pressure", initial_pressure, 1, "Pa", "Pore pressure at the start; saturated bodies.");
+  if (!section.describing() && !section.has("Shape"))
+    section.fail("Shape", "body '" + name + "' needs a 'Shape'");
+  if (!section.describing() && !section.has("Material"))
+    section.fail("Material", "body '" + name + "' needs a 'Material'");
+  shape = parse_shape<dim>(shape_text, section.constants(), section.origin("Shape"));
+}
+
+template <int dim>
+Body<dim>::Body(const BodyParameters<dim> &parameters, const Material &material, const Grid<dim> &grid,
+                const SchemeFields &scheme)
+    : body_name(parameters.name), body_material(material), grid(grid), columns(dim, material, scheme),
+      initial_shape(parameters.shape), particles(grid.triangulation(), grid.mapping(), columns.n_columns),
+      count_in_cell(grid.n_local_cells(), 0)
+{
+  seed(parameters);
+  attach_storage();
+  initial_number = particles.n_global_particles();
+  if (initial_number == 0)
+    parameters.section.fail("Shape", "body '" + body_name + "' has no material points: its shape lies outside the mesh "
+                                                            "or is smaller than the spacing of points");
+}
+
+namespace {
+  /// Half the mean edge lengths of what a box keeps of itself when it is cut.
+  template <int dim>
+  dealii::Tensor<1, dim> half_extents(const CutBox<dim> &part, const dealii::Tensor<1, dim> &edges)
+  {
+    dealii::Tensor<1, dim> half;
+    for (unsigned int d = 0; d < dim; ++d) {
+      const double cross_section = std::max(part.face_area[2 * d], part.face_area[2 * d + 1]);
+      const double length = cross_section > 0. ? part.volume / cross_section : std::pow(part.volume, 1. / dim);
+      half[d] = 0.5 * std::min(length, edges[d]);
+    }
+    return half;
+  }
+
+  template <int dim>
+  void fill_row(std::vector<double> &row, const Layout &layout, const Material &material,
+                const BodyParameters<dim> &parameters, const CutBox<dim> &part, const dealii::Tensor<1, dim> &half_extent)
+  {
+    double x[3] = {0., 0., 0.};
+    for (unsigned int d = 0; d < dim; ++d)
+      x[d] = part.centroid[d];
+    row.assign(layout.n_columns, 0.);
+    row[layout.mass] = material.density() * part.volume;
+    row[layout.volume] = part.volume;
+    for (unsigned int d = 0; d < dim; ++d)
+      row[layout.velocity + d] = parameters.initial_velocity.value(x, 0., d);
+    for (unsigned int c = 0; c < parameters.initial_stress.n_components(); ++c)
+      row[layout.stress + c] = parameters.initial_stress.value(x, 0., c);
+    if (layout.pressure >= 0)
+      row[layout.pressure] = parameters.initial_pressure.value(x, 0.);
+    if (layout.porosity >= 0)
+      row[layout.porosity] = material.mixture()->porosity();
+    if (layout.extent >= 0)
+      for (unsigned int d = 0; d < dim; ++d)
+        row[layout.extent + d] = half_extent[d];
+    int column = layout.state;
+    for (const StateField &field : material.law().state())
+      for (const double value : field.initial)
+        row[column++] = value;
+  }
+} // namespace
+
+template <int dim>
+void Body<dim>::seed(const BodyParameters<dim> &parameters)
+{
+  const unsigned int n = parameters.points_per_direction;
+  const unsigned int n_boxes = dim == 2 ? n * n : n * n * n;
+  const auto bounds = initial_shape->bounds();
+
+  struct Seed
+  {
+    CutBox<dim> part;
+    dealii::Tensor<1, dim> half_extent;
+  };
+  std::vector<std::pair<typename dealii::Triangulation<dim>::active_cell_iterator, Seed>> seeds;
+  for (const auto &cell : grid.triangulation().active_cell_iterators()) {
+    if (!cell->is_locally_owned())
+      continue;
+    const CellId id = cell->active_cell_index();
+    bool apart = false;
+    for (unsigned int d = 0; d < dim; ++d)
+      apart = apart || grid.lower(id, d) > bounds.upper[d] || grid.lower(id, d) + grid.size(id, d) < bounds.lower[d];
+    if (apart)
+      continue;
+    for (unsigned int b = 0; b < n_boxes; ++b) {
+      dealii::Point<dim> lower, upper;
+      dealii::Tensor<1, dim> edges;
+      for (unsigned int d = 0, rest = b; d < dim; ++d, rest /= n) {
+        const double h = grid.size(id, d);
+        lower[d] = grid.lower(id, d) + h * (rest % n) / n;
+        upper[d] = grid.lower(id, d) + h * (rest % n + 1) / n;
+        edges[d] = h / n;
+      }
+      const CutBox<dim> part = cut(*initial_shape, lower, upper);
+      if (part.volume > 0.)
+        seeds.push_back({cell, {part, half_extents(part, edges)}});
+    }
+  }
+
+  const dealii::types::particle_index n_local = seeds.size();
+  dealii::types::particle_index first_id = 0;
+  const int ierr = MPI_Exscan(&n_local, &first_id, 1, DEAL_II_PARTICLE_INDEX_MPI_TYPE, MPI_SUM, grid.communicator());
+  AssertThrowMPI(ierr);
+  if (dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0)
+    first_id = 0;
+
+  std::vector<double> row;
+  for (const auto &[cell, seed] : seeds) {
+    fill_row(row, columns, body_material, parameters, seed.part, seed.half_extent);
+    const auto unit = grid.mapping().transform_real_to_unit_cell(cell, seed.part.centroid);
+    particles.insert_particle(seed.part.centroid, unit, first_id++, cell, row);
+  }
+  particles.update_cached_numbers();
+}
+
+template <int dim>
+void Body<dim>::attach_storage()
+{
+  const std::size_t n = particles.n_locally_owned_particles();
+  cell_of_point.resize(n);
+  if (n > 0) {
+    auto &pool = particles.get_property_pool();
+    first_row = pool.get_properties(0).data();
+    // The pool's positions are writable one by one through set_location(); kernels update them in place.
+    first_position = const_cast<dealii::Point<dim> *>(&pool.get_location(0));
+  }
+  std::uint32_t handle = 0;
+  for (const auto &particle : particles) {
+    Assert(particle.get_local_index() == handle, dealii::ExcInternalError());
+    cell_of_point[handle++] = particle.get_surrounding_cell()->active_cell_index();
+  }
+  rebuild_slices();
+}
+
+template <int dim>
+dealii::types::particle_index Body<dim>::id(const std::uint32_t handle) const
+{
+  return particles.get_property_pool().get_id(handle);
+}
+
+template <int dim>
+void Body<dim>::rebuild_slices()
+{
+  std::vector<CellId> occupied;
+  for (const CellId cell : cell_of_point)
+    if (count_in_cell[cell]++ == 0)
+      occupied.push_back(cell);
+  std::sort(occupied.begin(), occupied.end());
+
+  cell_slices.clear();
+  std::uint32_t begin = 0;
+  for (const CellId cell : occupied) {
+    const std::uint32_t end = begin + count_in_cell[cell];
+    cell_slices.push_back({cell, begin, end});
+    count_in_cell[cell] = begin;
+    begin = end;
+  }
+  handles_by_cell.resize(cell_of_point.size());
+  for (std::uint32_t handle = 0; handle < cell_of_point.size(); ++handle)
+    handles_by_cell[count_in_cell[cell_of_point[handle]]++] = handle;
+  for (const CellId cell : occupied)
+    count_in_cell[cell] = 0;
+}
+
+template <int dim>
+typename Body<dim>::Relocation Body<dim>::relocate(const double time)
+{
+  Relocation result;
+  if (moved_points.empty())
+    return result;
+  const auto complain = [&](const std::uint32_t handle, const std::string &what) {
+    std::ostringstream message;
+    message << "point " << id(handle) << " of body '" << body_name << "' " << what << " at (" << position(handle)
+            << "), t = " << time << " s";
+    throw NumericalError(message.str());
+  };
+  for (const std::uint32_t handle : moved_points) {
+    const dealii::Point<dim> &x = position(handle);
+    if (!grid.contains(x))
+      complain(handle, "leaves the mesh");
+    auto lattice = grid.lattice(cell_of_point[handle]);
+    for (unsigned int d = 0; d < dim; ++d) {
+      const auto &planes = grid.planes(d);
+      if (x[d] < planes[lattice[d]])
+        --lattice[d];
+      else if (x[d] > planes[lattice[d] + 1])
+        ++lattice[d];
+      if (x[d] < planes[lattice[d]] || x[d] > planes[lattice[d] + 1])
+        complain(handle, "moves further than one cell in one step; the step is too large");
+    }
+    const CellId cell = grid.cell_at(lattice);
+    result.leaves_rank = result.leaves_rank || !grid.is_owned(cell);
+    cell_of_point[handle] = cell;
+  }
+  moved_points.clear();
+
+  std::vector<Slice> before;
+  before.swap(cell_slices);
+  rebuild_slices();
+  result.cells_changed =
+      before.size() != cell_slices.size() ||
+      !std::equal(before.begin(), before.end(), cell_slices.begin(),
+                  [](const Slice &a, const Slice &b) { return a.cell == b.cell; });
+  return result;
+}
+
+template <int dim>
+void Body<dim>::synchronise(const double time)
+{
+  particles.sort_particles_into_subdomains_and_cells();
+  attach_storage();
+  if (particles.n_global_particles() != initial_number) {
+    std::ostringstream message;
+    message << "body '" << body_name << "' lost " << initial_number - particles.n_global_particles()
+            << " of its points when they were handed to other ranks, t = " << time << " s";
+    throw NumericalError(message.str());
+  }
+}
+
+template struct BodyParameters<2>;
+template struct BodyParameters<3>;
+template class Body<2>;
+template class Body<3>;
+} // namespace peat

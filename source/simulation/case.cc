@@ -1,0 +1,191 @@
+#include <peat/simulation/case.h>
+
+#include <sstream>
+
+namespace peat {
+StageParameters::StageParameters(Section section) : name(section.name())
+{
+  std::string solver = "mpm";
+  section.add("Solver", solver, {"mpm"}, "'mpm': the explicit coupled material point method.");
+  section.add("Duration", duration, positive("s"), "How long the stage lasts.");
+  section.add("Local damping", local_damping, between(0., 0.99),
+              "Share of each node's out-of-balance force that acts against its velocity in this stage; for dynamic "
+              "relaxation to rest.");
+  if (!section.describing() && !section.has("Duration"))
+    section.fail("Duration", "stage '" + name + "' needs a 'Duration'");
+}
+
+unsigned int read_dimension(const ParameterFile &file)
+{
+  double dimension = 2;
+  Section root = file.root();
+  root.add("Dimension", dimension, between(2, 3), "2 (plane strain) or 3.");
+  if (dimension != 2 && dimension != 3)
+    root.fail("Dimension", "'Dimension' must be 2 or 3");
+  return dimension == 2 ? 2 : 3;
+}
+
+namespace {
+  std::string read_title(Section root)
+  {
+    std::string title;
+    root.add("Title", title, "A name for the run.");
+    return title;
+  }
+
+  std::vector<std::unique_ptr<Material>> read_materials(const Section &section)
+  {
+    std::vector<std::unique_ptr<Material>> materials;
+    for (const std::string &name : section.user_sections("MATERIAL"))
+      materials.push_back(std::make_unique<Material>(section.subsection(name)));
+    return materials;
+  }
+
+  template <typename Named>
+  std::vector<std::string> names(const std::vector<Named> &list)
+  {
+    std::vector<std::string> result;
+    for (const auto &item : list)
+      result.push_back(item.name);
+    return result;
+  }
+
+  template <int dim>
+  std::vector<BodyParameters<dim>> read_bodies(const Section &section,
+                                               const std::vector<std::unique_ptr<Material>> &materials)
+  {
+    std::vector<std::string> material_names;
+    for (const auto &material : materials)
+      material_names.push_back(material->name());
+    if (material_names.empty())
+      section.fail("", "the file has no material: a section 'Materials' with one subsection a material is needed");
+    std::vector<BodyParameters<dim>> bodies;
+    for (const std::string &name : section.user_sections("BODY"))
+      bodies.emplace_back(section.subsection(name), material_names);
+    if (bodies.empty())
+      section.fail("", "the file has no body: a section 'Bodies' with one subsection a body is needed");
+    return bodies;
+  }
+
+  template <int dim>
+  std::vector<std::unique_ptr<Condition<dim>>> read_conditions(const Section &section,
+                                                               const std::vector<std::string> &bodies)
+  {
+    std::vector<std::unique_ptr<Condition<dim>>> conditions;
+    for (const std::string &name : section.user_sections("CONDITION"))
+      conditions.push_back(make_condition<dim>(section.subsection(name), bodies));
+    return conditions;
+  }
+
+  template <int dim>
+  Function read_gravity(Section root)
+  {
+    Function gravity(dim == 2 ? "0, 0" : "0, 0, 0", {}, {});
+    root.add("Gravity", gravity, dim, "m/s^2",
+             "Acceleration of gravity; may depend on t, e.g. 0, -9.81*min(1, t/0.1).");
+    if (!gravity.is_uniform())
+      root.fail("Gravity", "'Gravity' may depend on t but not on place");
+    return gravity;
+  }
+
+  SchemeParameters read_scheme(Section root)
+  {
+    SchemeParameters scheme(root.subsection("Explicit MPM"));
+    root.add("Seepage inertia", scheme.seepage_inertia,
+             "Keep the term rho_f a in Darcy's law (the full u-p form). Without it the form is well posed for every "
+             "material.");
+    return scheme;
+  }
+
+  template <typename Parameters, typename... Arguments>
+  std::vector<Parameters> read_list(const Section &section, const std::string &example,
+                                    const Arguments &... arguments)
+  {
+    std::vector<Parameters> list;
+    for (const std::string &name : section.user_sections(example))
+      list.emplace_back(section.subsection(name), arguments...);
+    return list;
+  }
+} // namespace
+
+template <int dim>
+Case<dim>::Case(const ParameterFile &file)
+    : title(read_title(file.root())), grid(file.root().subsection("Grid")),
+      materials(read_materials(file.root().subsection("Materials"))),
+      bodies(read_bodies<dim>(file.root().subsection("Bodies"), materials)),
+      conditions(read_conditions<dim>(file.root().subsection("Conditions"), names(bodies))),
+      gravity(read_gravity<dim>(file.root())), scheme(read_scheme(file.root())),
+      stages(read_list<StageParameters>(file.root().subsection("Stages"), "STAGE")),
+      probes(read_list<ProbeParameters<dim>>(file.root().subsection("Probes"), "PROBE")),
+      references(read_list<ReferenceParameters<dim>>(file.root().subsection("References"), "REFERENCE", names(probes))),
+      output(file.root().subsection("Output"))
+{
+  if (file.root().describing())
+    return;
+  file.refuse_unknown_entries();
+  check(file.root());
+}
+
+template <int dim>
+void Case<dim>::check(const Section &root) const
+{
+  if (stages.empty())
+    root.fail("", "the file has no stage: a section 'Stages' with one subsection a stage is needed");
+  for (const auto &body : bodies) {
+    const Mixture *mixture = material(body.material).mixture();
+    if (!mixture && body.section.has("Initial pressure"))
+      body.section.fail("Initial pressure", "body '" + body.name + "' is of the dry material '" + body.material +
+                                                "' and has no pore pressure");
+    if (!mixture || !scheme.seepage_inertia)
+      continue;
+    const Law &law = material(body.material).law();
+    std::vector<Lanes> state;
+    for (const StateField &field : law.state())
+      for (const double value : field.initial)
+        state.push_back(broadcast(value));
+    const double M = law.wave_modulus({}, state.data())[0];
+    if (mixture->well_posedness(M) <= 0.) {
+      std::ostringstream message;
+      const double r = mixture->r();
+      message << "with material '" << body.material << "' the u-p form with seepage inertia is ill-posed: it needs "
+              << "alpha^2 Q (1 - r) > r M, but " << std::pow(mixture->biot_coefficient(), 2) * mixture->Q() * (1. - r)
+              << " < " << r * M << " Pa (r = alpha rho_f/rho); set 'Seepage inertia = false', or a stiffer fluid";
+      root.subsection("Materials").subsection(body.material).fail("", message.str());
+    }
+  }
+  for (const auto &condition : conditions)
+    if (condition->concerns_fluid() && !is_saturated())
+      condition->section.fail("Kind", "condition '" + condition->name +
+                                          "' is about pore fluid, but no body is saturated");
+}
+
+template <int dim>
+const Material &Case<dim>::material(const std::string &name) const
+{
+  for (const auto &material : materials)
+    if (material->name() == name)
+      return *material;
+  throw InputError("there is no material '" + name + "'");
+}
+
+template <int dim>
+bool Case<dim>::is_saturated() const
+{
+  for (const auto &body : bodies)
+    if (material(body.material).mixture())
+      return true;
+  return false;
+}
+
+template <int dim>
+double Case<dim>::end_time() const
+{
+  double end = 0.;
+  for (const auto &stage : stages)
+    end += stage.duration;
+  return end;
+}
+
+template struct Case<2>;
+template struct Case<3>;
+} // namespace peat

@@ -1,0 +1,58 @@
+#include <peat/simulation/simulation.h>
+
+#include <deal.II/base/mpi.h>
+
+namespace peat {
+namespace {
+  /// A shape must not be cut off silently by the mesh.
+  template <int dim>
+  void check_inside_mesh(const BodyParameters<dim> &body, const GridParameters<dim> &grid)
+  {
+    const auto bounds = body.shape->bounds();
+    for (unsigned int d = 0; d < dim; ++d) {
+      const double tolerance = 1e-9 * (grid.upper[d] - grid.lower[d]);
+      if (bounds.upper[d] <= grid.lower[d] || bounds.lower[d] >= grid.upper[d])
+        body.section.fail("Shape", "body '" + body.name + "' lies outside the mesh");
+      const bool bounded = std::isfinite(bounds.lower[d]) && std::isfinite(bounds.upper[d]);
+      if (bounded && (bounds.lower[d] < grid.lower[d] - tolerance || bounds.upper[d] > grid.upper[d] + tolerance))
+        body.section.fail("Shape", "body '" + body.name + "' reaches beyond the mesh; enlarge the mesh, or cut the "
+                                                           "shape with intersection(..., box(...))");
+    }
+  }
+} // namespace
+
+template <int dim>
+Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid)
+{
+  Scene<dim> scene;
+  scene.gravity = parameters.gravity;
+  for (const auto &body : parameters.bodies) {
+    check_inside_mesh(body, parameters.grid);
+    scene.bodies.push_back(std::make_unique<Body<dim>>(body, parameters.material(body.material), grid,
+                                                       parameters.scheme.fields()));
+  }
+  for (auto &condition : parameters.conditions) {
+    const std::string &name = condition->surface_of();
+    if (!name.empty() && scene.surfaces.find(name) == scene.surfaces.end()) {
+      auto &surface = scene.surfaces.emplace(name, grid).first->second;
+      for (const auto &body : parameters.bodies)
+        if (body.name == name)
+          surface.cover(*body.shape, body.points_per_direction);
+    }
+  }
+  if (!parameters.probes.empty()) {
+    scene.probes = std::make_unique<Tracers<dim>>(grid);
+    for (unsigned int i = 0; i < parameters.probes.size(); ++i) {
+      const auto &probe = parameters.probes[i];
+      if (!grid.contains(probe.point))
+        probe.section.fail("Point", "probe '" + probe.name + "' lies outside the mesh");
+      scene.probes->add(i, probe.point, dealii::Tensor<1, dim>());
+    }
+  }
+  scene.conditions = std::move(parameters.conditions);
+  return scene;
+}
+
+template Scene<2> make_scene<2>(Case<2> &, const Grid<2> &);
+template Scene<3> make_scene<3>(Case<3> &, const Grid<3> &);
+} // namespace peat

@@ -1,0 +1,89 @@
+#include <peat/simulation/simulation.h>
+
+#include <deal.II/base/mpi.h>
+
+#include <nlohmann/json.hpp>
+#include <sys/resource.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace peat {
+namespace {
+  double peak_memory(MPI_Comm communicator)
+  {
+    rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    return dealii::Utilities::MPI::sum(1024. * usage.ru_maxrss, communicator);
+  }
+
+  /// JSON knows no NaN.
+  nlohmann::ordered_json number(const double x)
+  {
+    return std::isfinite(x) ? nlohmann::ordered_json(x) : nlohmann::ordered_json(nullptr);
+  }
+} // namespace
+
+template <int dim>
+void Simulation<dim>::write_summary() const
+{
+  const double memory = peak_memory(communicator);
+  const std::size_t active_cells =
+      dealii::Utilities::MPI::sum(std::size_t(solver->nodes().occupied_cells().size()), communicator);
+  std::size_t n_owned_nodes = 0;
+  for (unsigned int i = 0; i < solver->nodes().size(); ++i)
+    n_owned_nodes += solver->nodes().is_owned(i);
+  n_owned_nodes = dealii::Utilities::MPI::sum(n_owned_nodes, communicator);
+  if (dealii::Utilities::MPI::this_mpi_process(communicator) != 0)
+    return;
+
+  const double n_ranks = dealii::Utilities::MPI::n_mpi_processes(communicator);
+  const double n_points = scene.n_global_points();
+  nlohmann::ordered_json summary;
+  summary["version"] = PEAT_VERSION;
+  summary["case"] = parameters.title.empty() ? options.file : parameters.title;
+  summary["method"] = "mpm";
+  summary["scheme"] = "explicit";
+  summary["dimension"] = dim;
+  summary["ranks"] = n_ranks;
+  summary["completed"] = !stopped && now >= planned_end;
+  summary["points"] = n_points;
+  summary["active_cells"] = active_cells;
+  summary["dofs"] = n_owned_nodes * dim;
+  summary["steps"] = steps.n_steps;
+  summary["simulated_time"] = number(now);
+  summary["dt"] = {{"min", number(steps.smallest)},
+                   {"max", number(steps.largest)},
+                   {"mean", number(steps.n_steps ? steps.total_time / steps.n_steps : 0.)},
+                   {"binding_limit", steps.limit}};
+  summary["wall_seconds"] = {{"total", wall.setup + wall.time_loop + wall.output},
+                             {"setup", wall.setup},
+                             {"time_loop", wall.time_loop},
+                             {"output", wall.output}};
+  summary["point_steps_per_second_per_rank"] =
+      number(wall.time_loop > 0. ? steps.n_steps * n_points / wall.time_loop / n_ranks : 0.);
+  summary["peak_memory_bytes"] = memory;
+  summary["lost_points"] = 0; // a lost point ends the run
+  summary["balance"] = {{"mass", number(balances->mass_error)},
+                        {"fluid_mass", number(balances->fluid_error)},
+                        {"momentum", number(balances->momentum_error)},
+                        {"energy", number(balances->energy_error)}};
+  summary["errors"] = nlohmann::ordered_json::object();
+  for (const auto &result : reference_results()) {
+    nlohmann::ordered_json entry;
+    for (const auto &[name, value] : result.values)
+      entry[name] = number(value);
+    summary["errors"][result.name] = entry;
+  }
+
+  const std::string path = directory + "/summary.json";
+  {
+    std::ofstream file(path + ".tmp");
+    file << summary.dump(2) << std::endl;
+  }
+  std::rename((path + ".tmp").c_str(), path.c_str());
+}
+
+template void Simulation<2>::write_summary() const;
+template void Simulation<3>::write_summary() const;
+} // namespace peat

@@ -1,0 +1,42 @@
+#include <peat/solver/scheme.h>
+
+#include <cmath>
+
+namespace peat {
+SchemeParameters::SchemeParameters(Section section)
+{
+  std::string basis_name = "gimp", transfer = "aflip", update = "usl";
+  section.add("Basis", basis_name, {"q1", "gimp"},
+              "Shape functions of the points. 'q1': FE_Q(1), cheapest, for points that stay in their cells. 'gimp': "
+              "FE_Q(1) averaged over the point's domain, ten to a hundred times less noise when points cross faces.");
+  section.add("Transfer", transfer, {"flip", "aflip", "tpic", "pic"},
+              "How velocities go from points to nodes and back. 'flip': points add the grid's acceleration. 'aflip': the "
+              "same with the points' velocity gradients on the way to the nodes, which removes the dispersion of FLIP. "
+              "'tpic': points take the grid's velocity and gradient; damps what is shorter than two cells. 'pic': points "
+              "take the grid's velocity; damps strongly.");
+  section.add("Stress update", update, {"usl", "musl"},
+              "When stresses follow the velocities. 'usl': from the nodes' new velocities, cheapest. 'musl': from the "
+              "points' new velocities mapped back to the nodes, for bodies whose edges cut through cells.");
+  section.add("Relaxation time", relaxation_time, nonnegative("s"),
+              "Time in which the points' velocities relax to the grid's in 'flip' and 'aflip'; damps noise at a rate that "
+              "does not depend on the step. 0: never.");
+  section.add("Local damping", local_damping, between(0., 0.99),
+              "Share of each node's out-of-balance force that acts against its velocity; for dynamic relaxation to rest.");
+  section.add("Pressure filter", pressure_filter, nonnegative(""),
+              "Rate, in units of c_u/h, at which pore pressures of points go to the mean of their cell; conserves the "
+              "fluid's volume.");
+  section.add("Step factor", step_factor, strictly_between(0., 100.), "Step over the stable step.");
+  section.add("Time step", fixed_step, nonnegative("s"), "A fixed step; 0 for the automatic one.");
+  basis = basis_name == "q1" ? Basis::q1 : Basis::gimp;
+  affine = transfer == "aflip" || transfer == "tpic";
+  grid_velocity = transfer == "pic" || transfer == "tpic";
+  stress_update = update == "usl" ? StressUpdate::last : StressUpdate::modified_last;
+}
+
+double SchemeParameters::retention(const double dt) const
+{
+  if (grid_velocity)
+    return 0.;
+  return relaxation_time > 0. ? std::exp(-dt / relaxation_time) : 1.;
+}
+} // namespace peat

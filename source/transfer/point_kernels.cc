@@ -1,0 +1,379 @@
+#include "point_kernels.h"
+
+#include <peat/material/mixture.h>
+
+namespace peat {
+namespace {
+  /// Pore fluid quantities of a batch at its present porosity.
+  struct FluidLanes
+  {
+    Lanes Q;
+    Lanes kappa;
+  };
+
+  FluidLanes fluid_at_start(const Mixture *mixture)
+  {
+    return mixture ? FluidLanes{broadcast(mixture->Q()), broadcast(mixture->mobility())} : FluidLanes{};
+  }
+
+  template <typename Batch>
+  FluidLanes fluid(const Mixture &mixture, const Layout &layout, const Batch &batch, const FluidLanes &at_start)
+  {
+    if (layout.porosity < 0)
+      return at_start;
+    const Lanes n = batch.load(layout.porosity);
+    return {1. / mixture.storage(n), mixture.mobility(n)};
+  }
+
+  Lanes determinant_of_step(const GradientLanes &du)
+  {
+    const Lanes f0 = 1. + du[0], f4 = 1. + du[4], f8 = 1. + du[8];
+    return f0 * (f4 * f8 - du[5] * du[7]) - du[1] * (du[3] * f8 - du[5] * du[6]) + du[2] * (du[3] * du[7] - f4 * du[6]);
+  }
+} // namespace
+
+template <int dim, unsigned int reach, bool saturated, bool affine>
+void PointKernels<dim, reach, saturated, affine>::scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes,
+                                                          double *sums, const unsigned int stride) const
+{
+  using S = Sums<dim>;
+  constexpr unsigned int n_sums = saturated ? S::n_saturated : S::n_dry;
+  const Layout &layout = body.layout();
+  const Mixture *mixture = body.material().mixture();
+  const FluidLanes at_start = fluid_at_start(mixture);
+
+  Batch<const double> batch;
+  std::array<Lanes, dim> x;
+  Weights<dim, reach> lane_weights;
+  // Per point: what the node vectors are multiplied with.
+  alignas(64) double total_stress[6][n_lanes], darcy[3][n_lanes];
+
+  for (const Slice &slice : body.slices()) {
+    const auto cell = intervals(nodes, slice.cell);
+    const NodeOffsets<dim, reach> offsets(cell);
+    alignas(64) NodeLanes local[n_sums][Chunks::n] = {};
+
+    for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
+      collect(body, slice, begin, batch);
+      evaluate(body, batch, cell, x, lane_weights);
+      const PointwiseWeights<dim, reach> w(lane_weights);
+      const Lanes V = batch.load(layout.volume);
+      Lanes alpha_p = broadcast(0.);
+      if constexpr (saturated) {
+        const FluidLanes f = fluid(*mixture, layout, batch, at_start);
+        const Lanes p = batch.load(layout.pressure);
+        alpha_p = mixture->biot_coefficient() * p;
+        reinterpret_cast<Lanes &>(darcy[0]) = V / f.kappa;
+        reinterpret_cast<Lanes &>(darcy[1]) = V * mixture->fluid_density();
+        reinterpret_cast<Lanes &>(darcy[2]) = V * p;
+      }
+      for (unsigned int c = 0; c < n_stress; ++c) {
+        const Lanes s = batch.load(layout.stress + c);
+        reinterpret_cast<Lanes &>(total_stress[c]) = V * (c < 3 ? s - alpha_p : s);
+      }
+
+      for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk) {
+        NodeLanes sum[n_sums];
+        for (unsigned int c = 0; c < n_sums; ++c)
+          sum[c] = local[c][chunk];
+        for (unsigned int l = 0; l < batch.n; ++l) {
+          const double *row = batch.row[l];
+          const ShapeAtNodes<dim, reach> shape(w, l, chunk);
+          const NodeLanes mN = row[layout.mass] * shape.N;
+          sum[S::mass] += mN;
+          for (unsigned int d = 0; d < dim; ++d) {
+            if constexpr (affine) {
+              NodeLanes v = row[layout.velocity + d] + NodeLanes{};
+              for (unsigned int e = 0; e < dim; ++e)
+                v += row[layout.velocity_gradient + dim * d + e] * (offsets.x[chunk][e] - (x[e][l] - cell[e].lower));
+              sum[S::momentum + d] += mN * v;
+            } else
+              sum[S::momentum + d] += row[layout.velocity + d] * mN;
+          }
+          if constexpr (dim == 2) {
+            sum[S::force] -= total_stress[0][l] * shape.dN[0] + total_stress[3][l] * shape.dN[1];
+            sum[S::force + 1] -= total_stress[3][l] * shape.dN[0] + total_stress[1][l] * shape.dN[1];
+          } else {
+            sum[S::force] -= total_stress[0][l] * shape.dN[0] + total_stress[3][l] * shape.dN[1] +
+                             total_stress[5][l] * shape.dN[2];
+            sum[S::force + 1] -= total_stress[3][l] * shape.dN[0] + total_stress[1][l] * shape.dN[1] +
+                                 total_stress[4][l] * shape.dN[2];
+            sum[S::force + 2] -= total_stress[5][l] * shape.dN[0] + total_stress[4][l] * shape.dN[1] +
+                                 total_stress[2][l] * shape.dN[2];
+          }
+          if constexpr (saturated) {
+            sum[S::resistance] += darcy[0][l] * shape.N;
+            sum[S::fluid_inertia] += darcy[1][l] * shape.N;
+            for (unsigned int d = 0; d < dim; ++d)
+              sum[S::pressure_force + d] += darcy[2][l] * shape.dN[d];
+          }
+        }
+        for (unsigned int c = 0; c < n_sums; ++c)
+          local[c][chunk] = sum[c];
+      }
+    }
+
+    const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
+    for (unsigned int i = 0; i < Chunks::n_nodes; ++i) {
+      double *out = sums + std::size_t(cell_nodes[i]) * stride;
+      for (unsigned int c = 0; c < n_sums; ++c)
+        out[c] += local[c][i / Chunks::width][i % Chunks::width];
+    }
+  }
+}
+
+template <int dim, unsigned int reach, bool saturated, bool affine>
+void PointKernels<dim, reach, saturated, affine>::advance(const Body<dim> &body, const Batch<double> &batch,
+                                                          const Weights<dim, reach> &w,
+                                                          const double (*a)[Chunks::n_nodes],
+                                                          const double (*v)[Chunks::n_nodes],
+                                                          const VelocityUpdate &update,
+                                                          std::array<Lanes, dim> &new_velocity)
+{
+  const int column = body.layout().velocity;
+  for (unsigned int d = 0; d < dim; ++d) {
+    Lanes velocity = broadcast(0.);
+    if (update.retention > 0.)
+      velocity = update.retention * (batch.load(column + d) + update.dt * interpolate<dim, reach>(a[d], w));
+    if (update.retention < 1.)
+      velocity += (1. - update.retention) * interpolate<dim, reach>(v[d], w);
+    batch.store(column + d, velocity);
+    new_velocity[d] = velocity;
+  }
+}
+
+template <int dim, unsigned int reach, bool saturated, bool affine>
+void PointKernels<dim, reach, saturated, affine>::advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes,
+                                                                    const double *a, const double *v,
+                                                                    const VelocityUpdate &update,
+                                                                    double *momentum) const
+{
+  const Layout &layout = body.layout();
+  Batch<double> batch;
+  std::array<Lanes, dim> x, velocity;
+  Weights<dim, reach> lane_weights;
+  alignas(64) double local_a[dim][Chunks::n_nodes], local_v[dim][Chunks::n_nodes];
+
+  for (const Slice &slice : body.slices()) {
+    const auto cell = intervals(nodes, slice.cell);
+    const NodeOffsets<dim, reach> offsets(cell);
+    const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
+    gather(a, cell_nodes, local_a);
+    gather(v, cell_nodes, local_v);
+    alignas(64) NodeLanes local[dim][Chunks::n] = {};
+
+    for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
+      collect(body, slice, begin, batch);
+      evaluate(body, batch, cell, x, lane_weights);
+      advance(body, batch, lane_weights, local_a, local_v, update, velocity);
+      const PointwiseWeights<dim, reach> w(lane_weights);
+      for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk)
+        for (unsigned int l = 0; l < batch.n; ++l) {
+          const double *row = batch.row[l];
+          const NodeLanes mN = row[layout.mass] * ShapeAtNodes<dim, reach>::value(w, l, chunk);
+          for (unsigned int d = 0; d < dim; ++d) {
+            NodeLanes velocity_at_nodes = velocity[d][l] + NodeLanes{};
+            if constexpr (affine)
+              for (unsigned int e = 0; e < dim; ++e)
+                velocity_at_nodes +=
+                    row[layout.velocity_gradient + dim * d + e] * (offsets.x[chunk][e] - (x[e][l] - cell[e].lower));
+            local[d][chunk] += mN * velocity_at_nodes;
+          }
+        }
+    }
+    for (unsigned int i = 0; i < Chunks::n_nodes; ++i)
+      for (unsigned int d = 0; d < dim; ++d)
+        momentum[std::size_t(cell_nodes[i]) * dim + d] += local[d][i / Chunks::width][i % Chunks::width];
+  }
+}
+
+template <int dim, unsigned int reach, bool saturated, bool affine>
+void PointKernels<dim, reach, saturated, affine>::deform_batch(
+    Body<dim> &body, const Batch<double> &batch, const std::array<CellInterval, dim> &cell,
+    const std::array<Lanes, dim> &x, const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
+    const double (*w)[Chunks::n_nodes], const double dt, StepFindings &findings)
+{
+  const Layout &layout = body.layout();
+  const Law &law = body.material().law();
+
+  // Kinematics of the step: the one place that knows about plane strain.
+  std::array<Lanes, dim> velocity;
+  GradientLanes du = {};
+  Lanes divergence = broadcast(0.), speed_squared = broadcast(0.);
+  for (unsigned int d = 0; d < dim; ++d) {
+    Lanes gradient[dim];
+    interpolate<dim, reach>(v[d], weights, velocity[d], gradient);
+    speed_squared += velocity[d] * velocity[d];
+    divergence += gradient[d];
+    for (unsigned int e = 0; e < dim; ++e) {
+      du[3 * d + e] = dt * gradient[e];
+      if constexpr (affine)
+        batch.store(layout.velocity_gradient + dim * d + e, gradient[e]);
+    }
+  }
+
+  StressLanes stress = {};
+  for (unsigned int c = 0; c < n_stress; ++c)
+    stress[c] = batch.load(layout.stress + c);
+  Lanes state[max_state_columns];
+  for (unsigned int c = 0; c < layout.n_state; ++c)
+    state[c] = batch.load(layout.state + c);
+  law.update(du, stress, state);
+  for (unsigned int c = 0; c < n_stress; ++c)
+    batch.store(layout.stress + c, stress[c]);
+  for (unsigned int c = 0; c < layout.n_state; ++c)
+    batch.store(layout.state + c, state[c]);
+  Lanes check = stress[0] + stress[1] + stress[2] + speed_squared;
+
+  if constexpr (saturated) {
+    const Mixture &mixture = *body.material().mixture();
+    Lanes outflow = broadcast(0.);
+    for (unsigned int d = 0; d < dim; ++d)
+      outflow += derivative<dim, reach>(w[d], weights, d);
+    const Lanes Q = layout.porosity < 0 ? broadcast(mixture.Q()) : 1. / mixture.storage(batch.load(layout.porosity));
+    const Lanes p =
+        batch.load(layout.pressure) - dt * Q * (outflow + mixture.biot_coefficient() * divergence);
+    batch.store(layout.pressure, p);
+    check += p;
+
+    Lanes V = batch.load(layout.volume);
+    for (unsigned int l = batch.n; l < n_lanes; ++l)
+      V[l] = 0.;
+    findings.fluid_outflow += dt * sum(V * outflow);
+    if (layout.porosity < 0)
+      findings.fluid_squeezed += dt * mixture.biot_coefficient() * sum(V * divergence);
+  }
+
+  if (law.finite_strain()) {
+    const Lanes dJ = determinant_of_step(du);
+    batch.store(layout.volume, dJ * batch.load(layout.volume));
+    if (layout.porosity >= 0)
+      batch.store(layout.porosity, 1. - (1. - batch.load(layout.porosity)) / dJ);
+    if constexpr (reach == 4)
+      for (unsigned int d = 0; d < dim; ++d)
+        batch.store(layout.extent + d, (1. + du[4 * d]) * batch.load(layout.extent + d));
+  }
+
+  // A comparison with NaN is false: what is not finite is found without a branch per point.
+  Lanes outside = broadcast(0.);
+  for (unsigned int d = 0; d < dim; ++d) {
+    const Lanes step = dt * velocity[d];
+    const Lanes new_x = x[d] + step;
+    batch.store(layout.displacement + d, batch.load(layout.displacement + d) + step);
+    outside = new_x >= cell[d].lower ? outside : broadcast(1.);
+    outside = new_x <= cell[d].lower + cell[d].size ? outside : broadcast(1.);
+    for (unsigned int l = 0; l < batch.n; ++l)
+      body.position(batch.handle[l])[d] = new_x[l];
+  }
+  const Lanes healthy = check - check == 0. ? broadcast(0.) : broadcast(1.);
+  if (sum(outside + healthy) > 0.)
+    for (unsigned int l = 0; l < batch.n; ++l) {
+      if (outside[l] > 0.)
+        body.movers().push_back(batch.handle[l]);
+      if (healthy[l] > 0.)
+        findings.finite = false;
+    }
+  double fastest = 0.;
+  for (unsigned int l = 0; l < n_lanes; ++l)
+    fastest = std::max(fastest, speed_squared[l]);
+  findings.largest_speed = std::max(findings.largest_speed, fastest);
+}
+
+template <int dim, unsigned int reach, bool saturated, bool affine>
+void PointKernels<dim, reach, saturated, affine>::filter_pressure(Body<dim> &body, const Slice &slice,
+                                                                  const double share)
+{
+  const Layout &layout = body.layout();
+  const Mixture &mixture = *body.material().mixture();
+  double content = 0., capacity = 0.;
+  const auto storage = [&](const double *row) {
+    return row[layout.volume] *
+           (layout.porosity >= 0 ? mixture.storage(broadcast(row[layout.porosity]))[0] : 1. / mixture.Q());
+  };
+  for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
+    const double *row = body.row(body.handles()[i]);
+    const double S = storage(row);
+    content += S * row[layout.pressure];
+    capacity += S;
+  }
+  const double mean = content / capacity;
+  for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
+    double &p = body.row(body.handles()[i])[layout.pressure];
+    p += share * (mean - p);
+  }
+}
+
+template <int dim, unsigned int reach, bool saturated, bool affine>
+void PointKernels<dim, reach, saturated, affine>::deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
+                                                         const double *v, const double *w, const double dt,
+                                                         const PressureUpdate &pressure,
+                                                         StepFindings &findings) const
+{
+  Batch<double> batch;
+  std::array<Lanes, dim> x;
+  Weights<dim, reach> weights;
+  alignas(64) double local_v[dim][Chunks::n_nodes], local_w[dim][Chunks::n_nodes];
+  for (const Slice &slice : body.slices()) {
+    const auto cell = intervals(nodes, slice.cell);
+    const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
+    gather(v, cell_nodes, local_v);
+    if constexpr (saturated)
+      gather(w, cell_nodes, local_w);
+    for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
+      collect(body, slice, begin, batch);
+      evaluate(body, batch, cell, x, weights);
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, dt, findings);
+    }
+    if (saturated && pressure.filter > 0.)
+      filter_pressure(body, slice, pressure.filter);
+  }
+}
+
+template <int dim, unsigned int reach, bool saturated, bool affine>
+void PointKernels<dim, reach, saturated, affine>::advance_and_deform(
+    Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v, const double *w,
+    const VelocityUpdate &update, const PressureUpdate &pressure, StepFindings &findings) const
+{
+  Batch<double> batch;
+  std::array<Lanes, dim> x, velocity;
+  Weights<dim, reach> weights;
+  alignas(64) double local_a[dim][Chunks::n_nodes], local_v[dim][Chunks::n_nodes], local_w[dim][Chunks::n_nodes];
+  for (const Slice &slice : body.slices()) {
+    const auto cell = intervals(nodes, slice.cell);
+    const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
+    gather(a, cell_nodes, local_a);
+    gather(v, cell_nodes, local_v);
+    if constexpr (saturated)
+      gather(w, cell_nodes, local_w);
+    for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
+      collect(body, slice, begin, batch);
+      evaluate(body, batch, cell, x, weights);
+      advance(body, batch, weights, local_a, local_v, update, velocity);
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, update.dt, findings);
+    }
+    if (saturated && pressure.filter > 0.)
+      filter_pressure(body, slice, pressure.filter);
+  }
+}
+
+namespace {
+  template <int dim, unsigned int reach>
+  std::unique_ptr<Kernels<dim>> make_for(const bool saturated, const bool affine)
+  {
+    if (saturated)
+      return affine ? std::unique_ptr<Kernels<dim>>(std::make_unique<PointKernels<dim, reach, true, true>>())
+                    : std::make_unique<PointKernels<dim, reach, true, false>>();
+    return affine ? std::unique_ptr<Kernels<dim>>(std::make_unique<PointKernels<dim, reach, false, true>>())
+                  : std::make_unique<PointKernels<dim, reach, false, false>>();
+  }
+} // namespace
+
+template <int dim>
+std::unique_ptr<Kernels<dim>> Kernels<dim>::make(const Basis basis, const bool saturated, const bool affine)
+{
+  return basis == Basis::q1 ? make_for<dim, 2>(saturated, affine) : make_for<dim, 4>(saturated, affine);
+}
+
+template std::unique_ptr<Kernels<2>> Kernels<2>::make(Basis, bool, bool);
+template std::unique_ptr<Kernels<3>> Kernels<3>::make(Basis, bool, bool);
+} // namespace peat

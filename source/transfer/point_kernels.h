@@ -1,0 +1,100 @@
+#pragma once
+
+#include <peat/transfer/kernels.h>
+
+#include "scatter.h"
+
+namespace peat {
+/// The kernels for one combination of basis, phases and transfer.
+template <int dim, unsigned int reach, bool saturated, bool affine>
+class PointKernels : public Kernels<dim>
+{
+public:
+  void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, double *sums,
+               const unsigned int stride) const override;
+  void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
+                         const VelocityUpdate &update, double *momentum) const override;
+  void deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *v, const double *w, const double dt,
+              const PressureUpdate &pressure, StepFindings &findings) const override;
+  void advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
+                          const double *w, const VelocityUpdate &update, const PressureUpdate &pressure,
+                          StepFindings &findings) const override;
+
+private:
+  using Chunks = NodeChunks<dim, reach>;
+  using NodeLanes = typename Chunks::Vector;
+  static constexpr unsigned int n_stress = dim == 2 ? 4 : 6;
+
+  /// Up to eight points of one cell. Lanes without a point repeat the last one.
+  template <typename Row>
+  struct Batch
+  {
+    unsigned int n;
+    std::array<std::uint32_t, n_lanes> handle;
+    std::array<Row *, n_lanes> row;
+
+    Lanes load(const int column) const
+    {
+      return Lanes{row[0][column], row[1][column], row[2][column], row[3][column],
+                   row[4][column], row[5][column], row[6][column], row[7][column]};
+    }
+    Lanes load_position(const Body<dim> &body, const unsigned int d) const
+    {
+      const auto x = [&](const unsigned int l) { return body.position(handle[l])[d]; };
+      return Lanes{x(0), x(1), x(2), x(3), x(4), x(5), x(6), x(7)};
+    }
+    void store(const int column, const Lanes x) const
+    {
+      for (unsigned int l = 0; l < n; ++l)
+        row[l][column] = x[l];
+    }
+  };
+
+  template <typename BodyType, typename Row>
+  static void collect(BodyType &body, const Slice &slice, const std::uint32_t begin, Batch<Row> &batch)
+  {
+    batch.n = std::min(n_lanes, slice.end - begin);
+    for (unsigned int l = 0; l < n_lanes; ++l) {
+      batch.handle[l] = body.handles()[begin + std::min(l, batch.n - 1)];
+      batch.row[l] = body.row(batch.handle[l]);
+    }
+  }
+
+  static std::array<CellInterval, dim> intervals(const ActiveNodes<dim> &nodes, const CellId cell)
+  {
+    std::array<CellInterval, dim> result;
+    for (unsigned int d = 0; d < dim; ++d)
+      result[d] = CellInterval::of(nodes.grid(), cell, d);
+    return result;
+  }
+
+  template <typename Row>
+  static void evaluate(const Body<dim> &body, const Batch<Row> &batch, const std::array<CellInterval, dim> &cell,
+                       std::array<Lanes, dim> &x, Weights<dim, reach> &w)
+  {
+    for (unsigned int d = 0; d < dim; ++d) {
+      x[d] = batch.load_position(body, d);
+      evaluate_direction(x[d], reach == 4 ? batch.load(body.layout().extent + d) : Lanes{}, cell[d], w[d]);
+    }
+  }
+
+  /// Copy dim nodal components of a cell's nodes: [component][node].
+  static void gather(const double *field, const std::uint32_t *cell_nodes, double (*local)[Chunks::n_nodes])
+  {
+    for (unsigned int i = 0; i < Chunks::n_nodes; ++i)
+      for (unsigned int d = 0; d < dim; ++d)
+        local[d][i] = field[std::size_t(cell_nodes[i]) * dim + d];
+  }
+
+  static void advance(const Body<dim> &body, const Batch<double> &batch, const Weights<dim, reach> &w,
+                      const double (*a)[Chunks::n_nodes], const double (*v)[Chunks::n_nodes],
+                      const VelocityUpdate &update, std::array<Lanes, dim> &new_velocity);
+
+  static void deform_batch(Body<dim> &body, const Batch<double> &batch, const std::array<CellInterval, dim> &cell,
+                           const std::array<Lanes, dim> &x, const Weights<dim, reach> &weights,
+                           const double (*v)[Chunks::n_nodes], const double (*w)[Chunks::n_nodes], const double dt,
+                           StepFindings &findings);
+
+  static void filter_pressure(Body<dim> &body, const Slice &slice, const double share);
+};
+} // namespace peat
