@@ -1,6 +1,7 @@
 #include <peat/base/prm_file.h>
 #include <peat/base/text.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>

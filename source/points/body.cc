@@ -100,20 +100,23 @@ void Body<dim>::seed(const BodyParameters<dim> &parameters)
   const unsigned int n_boxes = dim == 2 ? n * n : n * n * n;
   const auto bounds = initial_shape->bounds();
 
-  struct Seed
-  {
-    CutBox<dim> part;
-    dealii::Tensor<1, dim> half_extent;
-  };
-  std::vector<std::pair<typename dealii::Triangulation<dim>::active_cell_iterator, Seed>> seeds;
-  for (const auto &cell : grid.triangulation().active_cell_iterators()) {
-    if (!cell->is_locally_owned())
-      continue;
-    const CellId id = cell->active_cell_index();
-    bool apart = false;
+  const auto apart = [&](const CellId id) {
     for (unsigned int d = 0; d < dim; ++d)
-      apart = apart || grid.lower(id, d) > bounds.upper[d] || grid.lower(id, d) + grid.size(id, d) < bounds.lower[d];
-    if (apart)
+      if (grid.lower(id, d) > bounds.upper[d] || grid.lower(id, d) + grid.size(id, d) < bounds.lower[d])
+        return true;
+    return false;
+  };
+  std::size_t most_points = 0;
+  for (CellId id = 0; id < grid.n_local_cells(); ++id)
+    most_points += grid.is_owned(id) && !apart(id) ? n_boxes : 0;
+  // Without this the arrays would grow by doubling, which costs twice the memory while a large body is made.
+  particles.get_property_pool().reserve(most_points);
+
+  std::vector<double> row;
+  std::uint32_t n_local = 0;
+  for (const auto &cell : grid.triangulation().active_cell_iterators()) {
+    const CellId id = cell->active_cell_index();
+    if (!cell->is_locally_owned() || apart(id))
       continue;
     for (unsigned int b = 0; b < n_boxes; ++b) {
       dealii::Point<dim> lower, upper;
@@ -125,25 +128,29 @@ void Body<dim>::seed(const BodyParameters<dim> &parameters)
         edges[d] = h / n;
       }
       const CutBox<dim> part = cut(*initial_shape, lower, upper);
-      if (part.volume > 0.)
-        seeds.push_back({cell, {part, half_extents(part, edges)}});
+      if (part.volume == 0.)
+        continue;
+      fill_row(row, columns, body_material, parameters, part, half_extents(part, edges));
+      const auto unit = grid.mapping().transform_real_to_unit_cell(cell, part.centroid);
+      particles.insert_particle(part.centroid, unit, n_local++, cell, row);
     }
   }
+  number_points(n_local);
+  particles.update_cached_numbers();
+}
 
-  const dealii::types::particle_index n_local = seeds.size();
-  dealii::types::particle_index first_id = 0;
-  const int ierr = MPI_Exscan(&n_local, &first_id, 1, DEAL_II_PARTICLE_INDEX_MPI_TYPE, MPI_SUM, grid.communicator());
+template <int dim>
+void Body<dim>::number_points(const std::uint32_t n_local)
+{
+  const dealii::types::particle_index n = n_local;
+  dealii::types::particle_index first = 0;
+  const int ierr = MPI_Exscan(&n, &first, 1, DEAL_II_PARTICLE_INDEX_MPI_TYPE, MPI_SUM, grid.communicator());
   AssertThrowMPI(ierr);
   if (dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0)
-    first_id = 0;
-
-  std::vector<double> row;
-  for (const auto &[cell, seed] : seeds) {
-    fill_row(row, columns, body_material, parameters, seed.part, seed.half_extent);
-    const auto unit = grid.mapping().transform_real_to_unit_cell(cell, seed.part.centroid);
-    particles.insert_particle(seed.part.centroid, unit, first_id++, cell, row);
-  }
-  particles.update_cached_numbers();
+    return;
+  auto &pool = particles.get_property_pool();
+  for (std::uint32_t handle = 0; handle < n_local; ++handle)
+    pool.set_id(handle, first + pool.get_id(handle));
 }
 
 template <int dim>

@@ -54,20 +54,54 @@ void StepRecord::add(const double dt)
   total_time += dt;
 }
 
-/// All that is written while the run goes on.
+/// All that is written while the run goes on, and when.
 template <int dim>
 struct Simulation<dim>::Outputs
 {
-  Outputs(const std::string &directory, const bool is_first_rank) : statistics(directory, is_first_rank) {}
+  Outputs(const Case<dim> &parameters, const RunOptions &options, const std::string &directory,
+          const Scene<dim> &scene, const Grid<dim> &grid)
+      : statistics(directory, dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0),
+        comparison(parameters, std::filesystem::path(options.file).parent_path().string())
+  {
+    if (scene.probes)
+      probes = std::make_unique<ProbeWriter<dim>>(parameters, scene, grid, directory + "/probes.csv");
+    if (parameters.output.pictures)
+      pictures = std::make_unique<Pictures<dim>>(directory, scene, grid.communicator());
+  }
+
+  void plan(const OutputParameters &output, const double start, const double end)
+  {
+    const double statistics_interval =
+        output.statistics_interval > 0. ? output.statistics_interval : (end - start) / 200.;
+    statistics_times = Schedule::every(statistics_interval, start, end);
+    probe_times =
+        Schedule::every(output.probe_interval > 0. ? output.probe_interval : statistics_interval, start, end);
+    picture_times = Schedule::every(output.interval, start, end);
+    comparison_times = Schedule::at(comparison.times(), start, end);
+  }
+
+  /// When something is next due.
+  double next() const
+  {
+    double time = std::min(statistics_times.next(), comparison_times.next());
+    if (probes)
+      time = std::min(time, probe_times.next());
+    if (pictures)
+      time = std::min(time, picture_times.next());
+    return time;
+  }
 
   Statistics<dim> statistics;
-  Schedule statistics_times;
+  Comparison<dim> comparison;
+  std::unique_ptr<ProbeWriter<dim>> probes;
+  std::unique_ptr<Pictures<dim>> pictures;
+  Schedule statistics_times, probe_times, picture_times, comparison_times;
 };
 
 template <int dim>
 Simulation<dim>::Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options,
                             MPI_Comm communicator)
-    : parameters(parameters), options(options), communicator(communicator),
+    : begin(seconds()), parameters(parameters), options(options), communicator(communicator),
       directory(prepare_directory(options, communicator)),
       log(directory, dealii::Utilities::MPI::this_mpi_process(communicator) == 0, options.quiet),
       grid(parameters.grid, communicator), scene(make_scene(parameters, grid)), stage_scheme(parameters.scheme)
@@ -77,8 +111,9 @@ Simulation<dim>::Simulation(Case<dim> &parameters, const ParameterFile &file, co
     std::ofstream prm(directory + "/parameters.prm");
     file.write_prm(prm);
   }
-  outputs = std::make_unique<Outputs>(directory, first);
+  outputs = std::make_unique<Outputs>(parameters, options, directory, scene, grid);
   balances = std::make_unique<Balances<dim>>(totals(scene, communicator));
+  wall.setup = seconds() - begin;
 }
 
 template <int dim>
@@ -102,6 +137,7 @@ bool Simulation<dim>::run()
     throw;
   }
   write_summary();
+  log.line("results are in " + directory);
   return !stopped;
 }
 
@@ -122,16 +158,24 @@ void Simulation<dim>::run_stage(const StageParameters &stage, const double start
   const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
   solver = std::make_unique<ExplicitMPM<dim>>(stage_scheme, grid, scene, start, carried);
   solver->prepare();
-  outputs->statistics_times = Schedule::every(
-      parameters.output.statistics_interval > 0. ? parameters.output.statistics_interval : stage.duration / 200., start,
-      end);
-  log.line("stage '" + stage.name + "': " + std::to_string(stage.duration) + " s");
+  outputs->plan(parameters.output, start, end);
+  std::ostringstream message;
+  message << "stage '" << stage.name << "': " << stage.duration << " s, stable step " << solver->stable_step().dt
+          << " s (" << solver->stable_step().limit << ')';
+  log.line(message.str());
+  if (steps.n_steps == 0)
+    report(now, true);
 
   // Between two events the step is constant, unless the stable step has changed by then.
   constexpr unsigned int steps_between_checks = 100;
+  unsigned int steps_since_check = 0;
+  StableStep stable = solver->stable_step();
   double clock = seconds();
   while (now < end && !stopped) {
-    const StableStep stable = solver->stable_step();
+    if (steps_since_check >= steps_between_checks) {
+      stable = solver->stable_step();
+      steps_since_check = 0;
+    }
     const double wanted = stage_scheme.fixed_step > 0. ? stage_scheme.fixed_step : stage_scheme.step_factor * stable.dt;
     if (stage_scheme.fixed_step > stable.dt) {
       std::ostringstream message;
@@ -140,13 +184,15 @@ void Simulation<dim>::run_stage(const StageParameters &stage, const double start
       throw NumericalError(message.str());
     }
     steps.limit = stable.limit;
-    const double event = std::min(end, outputs->statistics_times.next());
+    const double event = std::min(end, outputs->next());
     const double n_steps = std::ceil((event - now) / wanted * (1. - 1e-12));
     const double dt = (event - now) / n_steps;
-    const bool reaches_event = n_steps <= steps_between_checks;
-    for (unsigned int i = 0; i < (reaches_event ? n_steps : steps_between_checks) && !stopped; ++i) {
+    const unsigned int n_now = std::min<double>(n_steps, steps_between_checks - steps_since_check);
+    const bool reaches_event = n_now == n_steps;
+    for (unsigned int i = 0; i < n_now && !stopped; ++i) {
       solver->step(dt);
       steps.add(dt);
+      ++steps_since_check;
       now = solver->time();
       stopped = interrupted();
     }
@@ -173,6 +219,23 @@ void Simulation<dim>::report(const double time, const bool everything)
     outputs->statistics.write(time, steps.n_steps, steps.n_steps ? solver->fields().dt : 0., steps.limit, sums,
                               *balances);
   }
+  if (outputs->comparison_times.due(time))
+    outputs->comparison.compare(time, scene, communicator);
+  if (outputs->probes && (outputs->probe_times.due(time) || everything) &&
+      !(steps.n_steps > 0 && outputs->probes->time() == time)) {
+    outputs->probes->write(time);
+    outputs->comparison.compare(*outputs->probes);
+  }
+  if (outputs->pictures && (outputs->picture_times.due(time) || everything))
+    outputs->pictures->write(time, solver->nodes(), solver->fields());
+}
+
+template <int dim>
+std::vector<typename Comparison<dim>::Result> Simulation<dim>::compare_with_references() const
+{
+  if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0 && !outputs->comparison.empty())
+    outputs->comparison.write_errors(directory + "/errors.csv");
+  return outputs->comparison.results();
 }
 
 template class Simulation<2>;

@@ -27,6 +27,7 @@ namespace {
 template <int dim>
 void Simulation<dim>::write_summary() const
 {
+  const auto results = compare_with_references();
   const double memory = peak_memory(communicator);
   const std::size_t active_cells =
       dealii::Utilities::MPI::sum(std::size_t(solver->nodes().occupied_cells().size()), communicator);
@@ -69,12 +70,15 @@ void Simulation<dim>::write_summary() const
                         {"momentum", number(balances->momentum_error)},
                         {"energy", number(balances->energy_error)}};
   summary["errors"] = nlohmann::ordered_json::object();
-  for (const auto &result : reference_results()) {
-    nlohmann::ordered_json entry;
-    for (const auto &[name, value] : result.values)
-      entry[name] = number(value);
-    summary["errors"][result.name] = entry;
-  }
+  for (const auto &result : results)
+    summary["errors"][result.reference] = {{"field", result.field},
+                                           {"L2", number(result.norms.L2)},
+                                           {"Linf", number(result.norms.Linf)},
+                                           {"relative_L1", number(result.relative_L1)},
+                                           {"relative_L2", number(result.relative_L2)},
+                                           {"relative_Linf", number(result.relative_Linf)},
+                                           {"compared", result.norms.n},
+                                           {"not_compared", result.norms.n_outside}};
 
   const std::string path = directory + "/summary.json";
   {

@@ -33,6 +33,32 @@ namespace {
 } // namespace
 
 template <int dim, unsigned int reach, bool saturated, bool affine>
+template <typename Row>
+void PointKernels<dim, reach, saturated, affine>::set_affine_field(
+    const Layout &layout, const Batch<Row> &batch, const std::array<CellInterval, dim> &cell,
+    const Weights<dim, reach> &w, const std::array<Lanes, dim> &velocity, AffineField &field)
+{
+  // The middle of the point's domain as its weights see it: with it the point's momentum arrives unchanged, also where
+  // the domain is cut off at the edge of the mesh.
+  std::array<Lanes, dim> middle;
+  for (unsigned int e = 0; e < dim; ++e) {
+    const CellInterval &c = cell[e];
+    middle[e] = w[e].value[reach == 4 ? 2 : 1] * c.size;
+    if constexpr (reach == 4)
+      middle[e] += w[e].value[3] * (c.size + c.size_above) - w[e].value[0] * c.size_below;
+  }
+  for (unsigned int d = 0; d < dim; ++d) {
+    Lanes at_corner = velocity[d];
+    for (unsigned int e = 0; e < dim; ++e) {
+      const Lanes gradient = batch.load(layout.velocity_gradient + dim * d + e);
+      reinterpret_cast<Lanes &>(field.gradient[d][e]) = gradient;
+      at_corner -= gradient * middle[e];
+    }
+    reinterpret_cast<Lanes &>(field.at_corner[d]) = at_corner;
+  }
+}
+
+template <int dim, unsigned int reach, bool saturated, bool affine>
 void PointKernels<dim, reach, saturated, affine>::scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                           double *sums, const unsigned int stride) const
 {
@@ -57,6 +83,13 @@ void PointKernels<dim, reach, saturated, affine>::scatter(const Body<dim> &body,
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, lane_weights);
       const PointwiseWeights<dim, reach> w(lane_weights);
+      AffineField affine_field;
+      if constexpr (affine) {
+        std::array<Lanes, dim> velocity;
+        for (unsigned int d = 0; d < dim; ++d)
+          velocity[d] = batch.load(layout.velocity + d);
+        set_affine_field(layout, batch, cell, lane_weights, velocity, affine_field);
+      }
       const Lanes V = batch.load(layout.volume);
       Lanes alpha_p = broadcast(0.);
       if constexpr (saturated) {
@@ -82,12 +115,9 @@ void PointKernels<dim, reach, saturated, affine>::scatter(const Body<dim> &body,
           const NodeLanes mN = row[layout.mass] * shape.N;
           sum[S::mass] += mN;
           for (unsigned int d = 0; d < dim; ++d) {
-            if constexpr (affine) {
-              NodeLanes v = row[layout.velocity + d] + NodeLanes{};
-              for (unsigned int e = 0; e < dim; ++e)
-                v += row[layout.velocity_gradient + dim * d + e] * (offsets.x[chunk][e] - (x[e][l] - cell[e].lower));
-              sum[S::momentum + d] += mN * v;
-            } else
+            if constexpr (affine)
+              sum[S::momentum + d] += mN * affine_velocity(affine_field, offsets, d, l, chunk);
+            else
               sum[S::momentum + d] += row[layout.velocity + d] * mN;
           }
           if constexpr (dim == 2) {
@@ -167,18 +197,17 @@ void PointKernels<dim, reach, saturated, affine>::advance_and_remap(Body<dim> &b
       evaluate(body, batch, cell, x, lane_weights);
       advance(body, batch, lane_weights, local_a, local_v, update, velocity);
       const PointwiseWeights<dim, reach> w(lane_weights);
+      AffineField affine_field;
+      if constexpr (affine)
+        set_affine_field(layout, batch, cell, lane_weights, velocity, affine_field);
       for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk)
         for (unsigned int l = 0; l < batch.n; ++l) {
-          const double *row = batch.row[l];
-          const NodeLanes mN = row[layout.mass] * ShapeAtNodes<dim, reach>::value(w, l, chunk);
-          for (unsigned int d = 0; d < dim; ++d) {
-            NodeLanes velocity_at_nodes = velocity[d][l] + NodeLanes{};
+          const NodeLanes mN = batch.row[l][layout.mass] * ShapeAtNodes<dim, reach>::value(w, l, chunk);
+          for (unsigned int d = 0; d < dim; ++d)
             if constexpr (affine)
-              for (unsigned int e = 0; e < dim; ++e)
-                velocity_at_nodes +=
-                    row[layout.velocity_gradient + dim * d + e] * (offsets.x[chunk][e] - (x[e][l] - cell[e].lower));
-            local[d][chunk] += mN * velocity_at_nodes;
-          }
+              local[d][chunk] += mN * affine_velocity(affine_field, offsets, d, l, chunk);
+            else
+              local[d][chunk] += mN * velocity[d][l];
         }
     }
     for (unsigned int i = 0; i < Chunks::n_nodes; ++i)

@@ -68,6 +68,25 @@ private:
     return result;
   }
 
+  /// The affine velocity field of each point of a batch: v(x) = at_corner + gradient (x - lower corner of the cell).
+  struct AffineField
+  {
+    alignas(64) double at_corner[dim][n_lanes];
+    alignas(64) double gradient[dim][dim][n_lanes];
+  };
+  template <typename Row>
+  static void set_affine_field(const Layout &layout, const Batch<Row> &batch,
+                               const std::array<CellInterval, dim> &cell, const Weights<dim, reach> &w,
+                               const std::array<Lanes, dim> &velocity, AffineField &field);
+  static NodeLanes affine_velocity(const AffineField &field, const NodeOffsets<dim, reach> &offsets,
+                                   const unsigned int d, const unsigned int point, const unsigned int chunk)
+  {
+    NodeLanes v = field.at_corner[d][point] + field.gradient[d][0][point] * offsets.x[chunk][0];
+    for (unsigned int e = 1; e < dim; ++e)
+      v += field.gradient[d][e][point] * offsets.x[chunk][e];
+    return v;
+  }
+
   template <typename Row>
   static void evaluate(const Body<dim> &body, const Batch<Row> &batch, const std::array<CellInterval, dim> &cell,
                        std::array<Lanes, dim> &x, Weights<dim, reach> &w)

@@ -92,6 +92,8 @@ public:
 
 private:
   void seed(const BodyParameters<dim> &parameters);
+  /// Make the points' ids, which so far count from 0 on each rank, unique over the ranks.
+  void number_points(std::uint32_t n_local);
   void rebuild_slices();
   void attach_storage();
 

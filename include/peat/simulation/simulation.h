@@ -1,7 +1,10 @@
 #pragma once
 
 #include <peat/simulation/case.h>
+#include <peat/simulation/comparison.h>
 #include <peat/simulation/log.h>
+#include <peat/simulation/pictures.h>
+#include <peat/simulation/probes.h>
 #include <peat/simulation/run_options.h>
 #include <peat/simulation/schedule.h>
 #include <peat/simulation/statistics.h>
@@ -52,8 +55,10 @@ private:
   void run_stage(const StageParameters &stage, double start);
   void report(double time, bool everything);
   void write_summary() const;
+  std::vector<typename Comparison<dim>::Result> compare_with_references() const;
   bool interrupted();
 
+  const double begin; ///< wall-clock time
   Case<dim> &parameters;
   const RunOptions options;
   MPI_Comm communicator;
