@@ -8,7 +8,8 @@ ActiveNodes<dim>::ActiveNodes(const Grid<dim> &grid, const unsigned int nodes_pe
     : background(grid), reach(nodes_per_direction),
       n_cell_nodes(dim == 2 ? nodes_per_direction * nodes_per_direction
                             : nodes_per_direction * nodes_per_direction * nodes_per_direction),
-      slot(grid.n_local_cells(), no_index), active_index(grid.locally_relevant_nodes().n_elements(), no_index)
+      slot(grid.n_local_cells(), no_index), active_index(grid.locally_relevant_nodes().n_elements(), no_index),
+      old_index(active_index)
 {}
 
 template <int dim>
@@ -49,8 +50,13 @@ void ActiveNodes<dim>::number_nodes(const std::vector<CellId> &occupied_cells)
 {
   for (const CellId cell : cells)
     slot[cell] = no_index;
-  for (const NodeId n : node)
+  for (const NodeId n : old_nodes)
+    old_index[n] = no_index;
+  for (const NodeId n : node) {
+    old_index[n] = active_index[n];
     active_index[n] = no_index;
+  }
+  old_nodes = node;
   node.clear();
   positions.clear();
   owned.clear();
@@ -68,6 +74,65 @@ void ActiveNodes<dim>::number_nodes(const std::vector<CellId> &occupied_cells)
       table[s * n_cell_nodes + i] = add(background.node_at(lattice));
     }
   }
+  separate_table = table;
+}
+
+template <int dim>
+unsigned int ActiveNodes<dim>::own_node(const unsigned int vertex) const
+{
+  unsigned int local = 0;
+  for (int d = dim - 1; d >= 0; --d)
+    local = local * reach + ((vertex >> d) & 1) + (reach == 4 ? 1 : 0);
+  return local;
+}
+
+template <int dim>
+unsigned int ActiveNodes<dim>::nearest_heavy_node(const std::array<double, 1 << dim> &own_mass,
+                                                  const unsigned int local, const double least_mass) const
+{
+  unsigned int best = 0;
+  int best_distance = std::numeric_limits<int>::max();
+  for (unsigned int v = 0; v < (1u << dim); ++v) {
+    if (own_mass[v] < least_mass)
+      continue;
+    int distance = 0;
+    const unsigned int candidate = own_node(v);
+    for (unsigned int d = 0, a = local, b = candidate; d < dim; ++d, a /= reach, b /= reach)
+      distance += std::abs(int(a % reach) - int(b % reach));
+    if (distance < best_distance || (distance == best_distance && own_mass[v] > own_mass[best])) {
+      best = v;
+      best_distance = distance;
+    }
+  }
+  return own_node(best);
+}
+
+template <int dim>
+bool ActiveNodes<dim>::aggregate(const double *mass, const unsigned int stride, const double smallest_share)
+{
+  bool any = false;
+  std::array<double, 1 << dim> own_mass;
+  for (std::size_t s = 0; s < cells.size(); ++s) {
+    const std::uint32_t *own = &separate_table[s * n_cell_nodes];
+    double heaviest = 0.;
+    for (unsigned int v = 0; v < own_mass.size(); ++v) {
+      own_mass[v] = mass[std::size_t(own[own_node(v)]) * stride];
+      heaviest = std::max(heaviest, own_mass[v]);
+    }
+    const double least = smallest_share * heaviest;
+    for (unsigned int i = 0; i < n_cell_nodes; ++i)
+      if (mass[std::size_t(own[i]) * stride] < least) {
+        table[s * n_cell_nodes + i] = own[nearest_heavy_node(own_mass, i, least)];
+        any = true;
+      }
+  }
+  return any;
+}
+
+template <int dim>
+void ActiveNodes<dim>::separate()
+{
+  table = separate_table;
 }
 
 template <int dim>

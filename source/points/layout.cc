@@ -21,8 +21,6 @@ Layout::Layout(const unsigned int dim, const Material &material, const SchemeFie
     n_state += field.initial.size();
   }
   Assert(n_state <= max_state_columns, dealii::ExcMessage("raise max_state_columns"));
-  if (scheme.velocity_gradient)
-    velocity_gradient = add("velocity gradient", "1/s", dim * dim, Kind::other);
   if (scheme.extent)
     extent = add("half extent", "m", dim, Kind::vector);
 }

@@ -27,7 +27,8 @@ bool reaches(const Curve &curve, const double x)
   return x >= curve.lower() - tolerance && x <= curve.upper() + tolerance;
 }
 
-/// The columns of displacement in a list of fields, added to it if they are needed to find places at the start.
+/// The columns of displacement in a list of fields, added to it if they are needed to find places at the
+/// start.
 template <int dim>
 std::vector<std::string> fields_for(const std::string &field)
 {
@@ -48,10 +49,11 @@ std::vector<const Body<dim> *> chosen_bodies(const Scene<dim> &scene, const std:
   return bodies;
 }
 
-/// Takes one value into the sums of which norms are made; L1 and L2 hold sum V |e| and sum V e^2 until finish().
+/// Takes one value into the sums of which norms are made; L1 and L2 hold sum V |e| and sum V e^2 until
+/// finish().
 template <int dim>
-void accumulate(typename Comparison<dim>::Norms &norms, const double V, const double value, const double reference,
-                const dealii::Point<dim> &x)
+void accumulate(typename Comparison<dim>::Norms &norms, const double V, const double value,
+                const double reference, const dealii::Point<dim> &x)
 {
   if (std::isnan(reference) || std::isnan(value)) {
     ++norms.n_outside;
@@ -99,12 +101,14 @@ void finish(typename Comparison<dim>::Norms &sums)
 }
 
 template <int dim>
-typename Comparison<dim>::Norms merge_ranks(const typename Comparison<dim>::Norms &mine, MPI_Comm communicator)
+typename Comparison<dim>::Norms merge_ranks(const typename Comparison<dim>::Norms &mine,
+                                            MPI_Comm communicator)
 {
   using Norms = typename Comparison<dim>::Norms;
   static_assert(std::is_trivially_copyable<Norms>::value, "sent as bytes");
   std::vector<Norms> all(dealii::Utilities::MPI::n_mpi_processes(communicator));
-  const int ierr = MPI_Allgather(&mine, sizeof(Norms), MPI_BYTE, all.data(), sizeof(Norms), MPI_BYTE, communicator);
+  const int ierr =
+      MPI_Allgather(&mine, sizeof(Norms), MPI_BYTE, all.data(), sizeof(Norms), MPI_BYTE, communicator);
   AssertThrowMPI(ierr);
   Norms sums = all.front();
   for (std::size_t rank = 1; rank < all.size(); ++rank)
@@ -135,7 +139,8 @@ Comparison<dim>::Comparison(const Case<dim> &parameters, const std::string &dire
       reference.times = given.times.empty() ? std::vector<double>{parameters.end_time()} : given.times;
     for (const double time : reference.times) {
       if (time > parameters.end_time() + time_tolerance)
-        given.section.fail("Times", "reference '" + given.name + "' is to be compared at t = " + to_text(time) +
+        given.section.fail("Times", "reference '" + given.name +
+                                        "' is to be compared at t = " + to_text(time) +
                                         " s, but the run ends at " + to_text(parameters.end_time()) + " s");
       all_times.push_back(time);
     }
@@ -151,7 +156,8 @@ void Comparison<dim>::read_table(Reference &reference, const std::string &direct
 {
   const ReferenceParameters<dim> &given = *reference.parameters;
   const std::filesystem::path path(given.file);
-  const std::string file = path.is_absolute() ? given.file : (std::filesystem::path(directory) / path).string();
+  const std::string file =
+      path.is_absolute() ? given.file : (std::filesystem::path(directory) / path).string();
   const auto read = [&] {
     try {
       return Table(file);
@@ -196,7 +202,9 @@ void Comparison<dim>::compare(const double time, const Scene<dim> &scene, MPI_Co
 {
   for (Reference &reference : references)
     for (std::size_t k = 0; k < reference.times.size(); ++k) {
-      if (std::abs(reference.times[k] - time) > time_tolerance)
+      const bool is_done = std::any_of(reference.done.begin(), reference.done.end(),
+                                       [&](const Norms &norms) { return norms.time == reference.times[k]; });
+      if (is_done || std::abs(reference.times[k] - time) > time_tolerance)
         continue;
       const Curve *curve = reference.curves.empty() ? nullptr : &reference.curves[k];
       const bool points = reference.parameters->single_points && !curve;
@@ -208,7 +216,8 @@ void Comparison<dim>::compare(const double time, const Scene<dim> &scene, MPI_Co
 
 template <int dim>
 typename Comparison<dim>::Norms Comparison<dim>::compare_cells(const Reference &reference, const Curve *curve,
-                                                               const double time, const Scene<dim> &scene) const
+                                                               const double time,
+                                                               const Scene<dim> &scene) const
 {
   Norms norms;
   norms.time = time;
@@ -218,7 +227,8 @@ typename Comparison<dim>::Norms Comparison<dim>::compare_cells(const Reference &
     dealii::Point<dim> x = means.centroid[e];
     for (unsigned int d = 0; d + 1 < means.n_fields; ++d)
       x[d] -= means.value(e, 1 + d);
-    accumulate<dim>(norms, means.volume[e], means.value(e, 0), expected(reference, curve, x, time), means.centroid[e]);
+    accumulate<dim>(norms, means.volume[e], means.value(e, 0), expected(reference, curve, x, time),
+                    means.centroid[e]);
   }
   return norms;
 }
@@ -274,7 +284,8 @@ std::vector<typename Comparison<dim>::Norms> Comparison<dim>::norms(const Refere
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const auto &[time, value, expected] = samples[k];
     norms.time = time;
-    const double before = k > 0 ? samples[k - 1][0] : time, after = k + 1 < samples.size() ? samples[k + 1][0] : time;
+    const double before = k > 0 ? samples[k - 1][0] : time,
+                 after = k + 1 < samples.size() ? samples[k + 1][0] : time;
     const double weight = samples.size() == 1 ? 1. : 0.5 * (after - before);
     accumulate<dim>(norms, weight, value, expected, reference.place);
   }
@@ -294,7 +305,8 @@ typename Comparison<dim>::Result Comparison<dim>::result(const Reference &refere
     result.norms.time = one.time;
   }
   finish<dim>(result.norms);
-  result.scale = reference.parameters->scale > 0. ? reference.parameters->scale : result.norms.largest_reference;
+  result.scale =
+      reference.parameters->scale > 0. ? reference.parameters->scale : result.norms.largest_reference;
   result.relative_L1 = result.norms.L1 / result.scale;
   result.relative_L2 = result.norms.L2 / result.scale;
   result.relative_Linf = result.norms.Linf / result.scale;
@@ -319,8 +331,8 @@ void Comparison<dim>::write_errors(const std::string &file_name) const
     const double scale = result(reference).scale;
     for (Norms one : norms(reference)) {
       finish<dim>(one);
-      file << csv_entry(reference.parameters->name) << ',' << one.time << ',' << one.L2 << ',' << one.Linf << ','
-           << one.L2 / scale << ',' << one.Linf / scale << ',' << one.n << '\n';
+      file << csv_entry(reference.parameters->name) << ',' << one.time << ',' << one.L2 << ',' << one.Linf
+           << ',' << one.L2 / scale << ',' << one.Linf / scale << ',' << one.n << '\n';
     }
   }
   if (!file)

@@ -121,7 +121,8 @@ void require_field(const Case<dim> &parameters, const std::string &body, const s
     if (!body.empty() && candidate.name != body)
       continue;
     const Material &material = parameters.material(candidate.material);
-    for (const std::string &name : FieldAccess::names(Layout(dim, material, parameters.scheme.fields()), material))
+    for (const std::string &name :
+         FieldAccess::names(Layout(dim, material, parameters.scheme.fields()), material))
       if (std::find(known.begin(), known.end(), name) == known.end())
         known.push_back(name);
   }
@@ -150,8 +151,8 @@ std::vector<CellId> occupied_cells(const std::vector<const Body<dim> *> &bodies)
 } // namespace
 
 template <int dim>
-void integrate(const Body<dim> &body, const Slice &slice, const std::vector<FieldAccess> &fields, double &volume,
-               dealii::Point<dim> &moment, double *sums)
+void integrate(const Body<dim> &body, const Slice &slice, const std::vector<FieldAccess> &fields,
+               double &volume, dealii::Point<dim> &moment, double *sums)
 {
   for (std::uint32_t k = slice.begin; k < slice.end; ++k) {
     const std::uint32_t handle = body.handles()[k];
@@ -166,7 +167,8 @@ void integrate(const Body<dim> &body, const Slice &slice, const std::vector<Fiel
 }
 
 template <int dim>
-CellMeans<dim> cell_means(const std::vector<const Body<dim> *> &bodies, const std::vector<std::string> &fields)
+CellMeans<dim> cell_means(const std::vector<const Body<dim> *> &bodies,
+                          const std::vector<std::string> &fields)
 {
   std::vector<const Body<dim> *> chosen;
   std::vector<std::vector<FieldAccess>> accesses;
@@ -195,7 +197,7 @@ CellMeans<dim> cell_means(const std::vector<const Body<dim> *> &bodies, const st
       while (means.cell[entry] < slice.cell)
         ++entry;
       integrate(*chosen[b], slice, accesses[b], means.volume[entry], means.centroid[entry],
-                 means.values.data() + entry * fields.size());
+                means.values.data() + entry * fields.size());
     }
   }
   for (std::size_t entry = 0; entry < means.size(); ++entry) {
@@ -206,12 +208,13 @@ CellMeans<dim> cell_means(const std::vector<const Body<dim> *> &bodies, const st
   return means;
 }
 
-#define PEAT_INSTANTIATE(dim)                                                                                          \
-  template void require_field<dim>(const Case<dim> &, const std::string &, const std::string &, const Section &,       \
-                                   const std::string &);                                                               \
-  template void integrate<dim>(const Body<dim> &, const Slice &, const std::vector<FieldAccess> &, double &,           \
-                               dealii::Point<dim> &, double *);                                                        \
-  template CellMeans<dim> cell_means<dim>(const std::vector<const Body<dim> *> &, const std::vector<std::string> &);
+#define PEAT_INSTANTIATE(dim)                                                                                \
+  template void require_field<dim>(const Case<dim> &, const std::string &, const std::string &,              \
+                                   const Section &, const std::string &);                                    \
+  template void integrate<dim>(const Body<dim> &, const Slice &, const std::vector<FieldAccess> &, double &, \
+                               dealii::Point<dim> &, double *);                                              \
+  template CellMeans<dim> cell_means<dim>(const std::vector<const Body<dim> *> &,                            \
+                                          const std::vector<std::string> &);
 PEAT_INSTANTIATE(2)
 PEAT_INSTANTIATE(3)
 #undef PEAT_INSTANTIATE

@@ -12,8 +12,8 @@
 
 namespace peat {
 namespace {
-/// A scalar (1), vector (dim) or tensor (9) of a picture: which numbers of a row of data its components are; -1 stands
-/// for zero.
+/// A scalar (1), vector (dim) or tensor (9) of a picture: which numbers of a row of data its components are;
+/// -1 stands for zero.
 struct Quantity
 {
   std::string name;
@@ -100,7 +100,9 @@ protected:
   get_nonscalar_data_ranges() const override
   {
     namespace Interpretation = dealii::DataComponentInterpretation;
-    std::vector<std::tuple<unsigned int, unsigned int, std::string, Interpretation::DataComponentInterpretation>> ranges;
+    std::vector<
+        std::tuple<unsigned int, unsigned int, std::string, Interpretation::DataComponentInterpretation>>
+        ranges;
     unsigned int first = 0;
     for (const Quantity &quantity : quantities) {
       const unsigned int n = quantity.source.size();
@@ -140,10 +142,11 @@ template <int dim>
 Pictures<dim>::Pictures(const std::string &directory, const Scene<dim> &scene, MPI_Comm communicator)
     : directory(directory), scene(scene), communicator(communicator)
 {
+  std::error_code error;
   if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0)
-    std::filesystem::create_directories(directory + "/pictures");
-  const int ierr = MPI_Barrier(communicator);
-  AssertThrowMPI(ierr);
+    std::filesystem::create_directories(directory + "/pictures", error);
+  if (dealii::Utilities::MPI::max(error.value(), communicator) != 0)
+    throw InputError("cannot make the directory '" + directory + "/pictures'");
 }
 
 template <int dim>
@@ -153,8 +156,9 @@ void Pictures<dim>::write(const double time, const ActiveNodes<dim> &nodes, cons
   for (const auto &body : scene.bodies)
     write_points(time, *body);
   ++n_times;
-  if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0)
-    write_list();
+  const bool written = dealii::Utilities::MPI::this_mpi_process(communicator) != 0 || write_list();
+  if (dealii::Utilities::MPI::min(int(written), communicator) == 0)
+    throw NumericalError("cannot write '" + directory + "/solution.pvd'");
 }
 
 template <int dim>
@@ -163,7 +167,8 @@ std::string Pictures<dim>::add_entry(const double time, const std::string &name)
   if (parts.find(name) == parts.end()) {
     std::string file_name = name.empty() ? "grid" : in_file_name(name);
     const auto taken = [&] {
-      return std::any_of(parts.begin(), parts.end(), [&](const auto &p) { return p.second.file_name == file_name; });
+      return std::any_of(parts.begin(), parts.end(),
+                         [&](const auto &p) { return p.second.file_name == file_name; });
     };
     while (taken())
       file_name += '_';
@@ -207,7 +212,8 @@ std::vector<std::string> projected_fields()
 } // namespace
 
 template <int dim>
-void Pictures<dim>::write_grid(const double time, const ActiveNodes<dim> &nodes, const NodalFields<dim> &fields)
+void Pictures<dim>::write_grid(const double time, const ActiveNodes<dim> &nodes,
+                               const NodalFields<dim> &fields)
 {
   const bool saturated = scene.is_saturated();
   std::vector<const Body<dim> *> bodies;
@@ -252,7 +258,8 @@ void Pictures<dim>::write_points(const double time, const Body<dim> &body)
       quantities.push_back({field.name, field.unit, consecutive(field.first_column, field.n_components)});
     else
       for (unsigned int c = 0; c < field.n_components; ++c)
-        quantities.push_back({field.name + ' ' + std::to_string(c + 1), field.unit, {int(field.first_column + c)}});
+        quantities.push_back(
+            {field.name + ' ' + std::to_string(c + 1), field.unit, {int(field.first_column + c)}});
   }
   quantities.push_back({"id", "", {int(layout.n_columns)}});
 
@@ -268,24 +275,25 @@ void Pictures<dim>::write_points(const double time, const Body<dim> &body)
   file.write(add_entry(time, body.name()), time, n_times, communicator);
 }
 
-/// Under another name first, so that ParaView never finds half a file.
+/// Under another name first, so that ParaView never finds half a file. Returns whether it worked.
 template <int dim>
-void Pictures<dim>::write_list() const
+bool Pictures<dim>::write_list() const
 {
   const std::string name = directory + "/solution.pvd";
-  {
-    std::ofstream file(name + ".tmp");
-    file.precision(12);
-    file << "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
-         << "  <Collection>\n";
-    for (const Entry &entry : entries)
-      file << "    <DataSet timestep=\"" << entry.time << "\" group=\"\" part=\"" << entry.part << "\" name=\""
-           << in_xml(entry.name) << "\" file=\"" << entry.file << "\"/>\n";
-    file << "  </Collection>\n</VTKFile>\n";
-    if (!file)
-      throw NumericalError("cannot write '" + name + "'");
-  }
-  std::filesystem::rename(name + ".tmp", name);
+  std::ofstream file(name + ".tmp");
+  file.precision(12);
+  file << "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" "
+          "byte_order=\"LittleEndian\">\n"
+       << "  <Collection>\n";
+  for (const Entry &entry : entries)
+    file << "    <DataSet timestep=\"" << entry.time << "\" group=\"\" part=\"" << entry.part << "\" name=\""
+         << in_xml(entry.name) << "\" file=\"" << entry.file << "\"/>\n";
+  file << "  </Collection>\n</VTKFile>\n";
+  file.close();
+  std::error_code error;
+  if (file)
+    std::filesystem::rename(name + ".tmp", name, error);
+  return file && !error;
 }
 
 template class Pictures<2>;

@@ -53,10 +53,10 @@ ProbeWriter<dim>::ProbeWriter(const Case<dim> &parameters, const Scene<dim> &sce
   values.assign(probes.size() * (dim + fields.size()), nan);
   if (!probes.empty() && dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0) {
     file.open(file_name);
-    if (!file)
-      throw InputError("cannot write '" + file_name + "'");
     write_header();
   }
+  if (dealii::Utilities::MPI::min(int(file.good()), grid.communicator()) == 0)
+    throw InputError("cannot write '" + file_name + "'");
 }
 
 template <int dim>
@@ -94,7 +94,8 @@ void ProbeWriter<dim>::write_header()
     for (unsigned int d = 0; d < dim; ++d)
       file << ',' << csv_entry(probe.name + '/' + axis_names[d] + " [m]");
     for (std::size_t f = 0; f < fields.size(); ++f)
-      file << ',' << csv_entry(probe.name + '/' + fields[f] + " [" + (units[f].empty() ? "-" : units[f]) + ']');
+      file << ','
+           << csv_entry(probe.name + '/' + fields[f] + " [" + (units[f].empty() ? "-" : units[f]) + ']');
   }
   file << std::endl;
 }
@@ -109,7 +110,8 @@ void ProbeWriter<dim>::write(const double time)
   const std::vector<double> sums = sum_moments(places);
   const std::size_t n_values = dim + fields.size();
   for (std::size_t p = 0; p < probes.size(); ++p)
-    evaluate(probes[p], &places[p * n_place], &sums[p * scene.bodies.size() * block_size()], &values[p * n_values]);
+    evaluate(probes[p], &places[p * n_place], &sums[p * scene.bodies.size() * block_size()],
+             &values[p * n_values]);
 
   if (!file.is_open())
     return;
@@ -192,8 +194,8 @@ std::vector<double> ProbeWriter<dim>::sum_moments(const std::vector<double> &pla
 }
 
 template <int dim>
-void ProbeWriter<dim>::add_cell(const CellId cell, const dealii::Point<dim> &x, const dealii::Tensor<1, dim> &size,
-                                const unsigned int b, double *sums) const
+void ProbeWriter<dim>::add_cell(const CellId cell, const dealii::Point<dim> &x,
+                                const dealii::Tensor<1, dim> &size, const unsigned int b, double *sums) const
 {
   const Body<dim> &body = *scene.bodies[b];
   const auto &slices = body.slices();
@@ -246,7 +248,8 @@ int ProbeWriter<dim>::choose_body(const Probe &probe, const double *sums) const
 }
 
 template <int dim>
-void ProbeWriter<dim>::evaluate(const Probe &probe, const double *place, const double *sums, double *result) const
+void ProbeWriter<dim>::evaluate(const Probe &probe, const double *place, const double *sums,
+                                double *result) const
 {
   std::fill_n(result, dim + fields.size(), nan);
   if (place[0] == 0.)

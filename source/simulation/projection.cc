@@ -7,7 +7,8 @@
 
 namespace peat {
 namespace {
-/// Spread of the data [cell sizes^2] below which a slope is not taken from them: it would amplify their errors.
+/// Spread of the data [cell sizes^2] below which a slope is not taken from them: it would amplify their
+/// errors.
 constexpr double smallest_spread = 0.02;
 /// Fill of the cells next to a node from which on no others are asked.
 constexpr double inner_fill = 0.75;
@@ -49,8 +50,8 @@ std::array<double, 1 + dim> LinearFit<dim>::coefficients(const double *moments)
     for (unsigned int l = k; l < dim; ++l)
       spread[k][l] = *moments++ / w - middle[k] * middle[l];
 
-  // value = mean - slope . middle with slope = spread^-1 (sum w d f / w - middle mean), in those principal directions
-  // in which the data allow it.
+  // value = mean - slope . middle with slope = spread^-1 (sum w d f / w - middle mean), in those principal
+  // directions in which the data allow it.
   dealii::Tensor<1, dim> step;
   for (const auto &[variance, direction] :
        dealii::eigenvectors(spread, dealii::SymmetricTensorEigenvectorMethod::jacobi))
@@ -82,13 +83,14 @@ NodalProjection<dim>::NodalProjection(const ActiveNodes<dim> &nodes, const CellM
     coefficients[i] = Fit::coefficients(&moments[i * n_moments]);
 
   values.assign(std::size_t(nodes.size()) * n_fields, 0.);
-  for_each_pair([&](const std::size_t i, const std::size_t entry, const double w, const dealii::Tensor<1, dim> &d) {
-    double c = coefficients[i][0];
-    for (unsigned int k = 0; k < dim; ++k)
-      c += coefficients[i][1 + k] * d[k];
-    for (unsigned int f = 0; f < n_fields; ++f)
-      values[i * n_fields + f] += w * c * mean[entry * n_fields + f];
-  });
+  for_each_pair(
+      [&](const std::size_t i, const std::size_t entry, const double w, const dealii::Tensor<1, dim> &d) {
+        double c = coefficients[i][0];
+        for (unsigned int k = 0; k < dim; ++k)
+          c += coefficients[i][1 + k] * d[k];
+        for (unsigned int f = 0; f < n_fields; ++f)
+          values[i * n_fields + f] += w * c * mean[entry * n_fields + f];
+      });
   nodes.sum_over_ranks(values.data(), n_fields);
   for (std::size_t i = 0; i < nodes.size(); ++i)
     if (moments[i * n_moments] == 0.)
@@ -134,7 +136,8 @@ void NodalProjection<dim>::gather_ghosts(const CellMeans<dim> &means)
       x[d] = data[1 + d];
     append(iterator->active_cell_index(), data[0], x, data.data() + 1 + dim);
   };
-  dealii::GridTools::exchange_cell_data_to_ghosts<Data, dealii::Triangulation<dim>>(grid.triangulation(), pack, unpack);
+  dealii::GridTools::exchange_cell_data_to_ghosts<Data, dealii::Triangulation<dim>>(grid.triangulation(),
+                                                                                    pack, unpack);
 }
 
 template <int dim>
@@ -160,9 +163,9 @@ void NodalProjection<dim>::find_inner_nodes()
   }
 }
 
-/// Visits (node, entry, weight, distance). A cell of this rank brings its own mean to its corners and, where these are
-/// not inner nodes, the means of its neighbours, so that a node on an edge sees two layers; all that takes part is known
-/// to the rank that owns the cell.
+/// Visits (node, entry, weight, distance). A cell of this rank brings its own mean to its corners and, where
+/// these are not inner nodes, the means of its neighbours, so that a node on an edge sees two layers; all
+/// that takes part is known to the rank that owns the cell.
 template <int dim>
 template <typename Visit>
 void NodalProjection<dim>::for_each_pair(const Visit &visit) const

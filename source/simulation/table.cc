@@ -66,7 +66,8 @@ Table::Table(const std::string &file_name)
       columns[c].push_back(read_number(entries[c], origin, column_names[c]));
   }
   if (column_names.empty() || columns.front().empty())
-    throw InputError(origin, "the table holds no numbers: a line of column names and lines of numbers are needed");
+    throw InputError(origin,
+                     "the table holds no numbers: a line of column names and lines of numbers are needed");
 }
 
 bool Table::has(const std::string &name) const
@@ -98,7 +99,8 @@ Curve::Curve(const std::vector<double> &x, const std::vector<double> &y)
   for (std::size_t i = 0; i < x.size(); ++i)
     if (!std::isnan(x[i]) && !std::isnan(y[i]))
       order.push_back(i);
-  std::stable_sort(order.begin(), order.end(), [&](const std::size_t a, const std::size_t b) { return x[a] < x[b]; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](const std::size_t a, const std::size_t b) { return x[a] < x[b]; });
   for (const std::size_t i : order) {
     const bool again = !pieces.empty() && pieces.back().x.back() == x[i];
     if (again && pieces.back().y.back() == y[i])
@@ -112,7 +114,8 @@ Curve::Curve(const std::vector<double> &x, const std::vector<double> &y)
 
 double Curve::value(const double x) const
 {
-  const auto found = std::find_if(pieces.begin(), pieces.end(), [x](const Piece &p) { return x <= p.x.back(); });
+  const auto found =
+      std::find_if(pieces.begin(), pieces.end(), [x](const Piece &p) { return x <= p.x.back(); });
   return found == pieces.end() ? pieces.back().y.back() : found->value(x);
 }
 

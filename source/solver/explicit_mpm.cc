@@ -41,7 +41,7 @@ ExplicitMPM<dim>::ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &g
       active(grid, static_cast<unsigned int>(scheme.basis)), now(start_time), book(carried)
 {
   for (const auto &body : scene.bodies)
-    kernels.push_back(Kernels<dim>::make(scheme.basis, body->material().mixture() != nullptr, scheme.affine));
+    kernels.push_back(Kernels<dim>::make(scheme.basis, body->material().mixture() != nullptr));
   nodal.n_sums = saturated ? Sums<dim>::n_saturated : Sums<dim>::n_dry;
 }
 
@@ -56,6 +56,9 @@ void ExplicitMPM<dim>::prepare()
   occupied.erase(std::unique(occupied.begin(), occupied.end()), occupied.end());
   active.rebuild(occupied);
   resize_fields();
+  if (scheme.nodes_keep_velocity)
+    renumber_kept_velocity();
+  steps_to_aggregation = 0;
 
   std::vector<bool> open(2 * dim, false);
   for (const auto &condition : scene.conditions) {
@@ -87,10 +90,92 @@ void ExplicitMPM<dim>::resize_fields()
 }
 
 template <int dim>
+void ExplicitMPM<dim>::renumber_kept_velocity()
+{
+  std::vector<double> velocity(active.size() * dim, 0.);
+  std::vector<char> known(active.size(), false);
+  for (std::size_t i = 0; i < active.size(); ++i)
+    if (const std::uint32_t old = active.previous_index(i); old < kept_is_known.size()) {
+      known[i] = kept_is_known[old];
+      for (unsigned int d = 0; d < dim; ++d)
+        velocity[i * dim + d] = kept_velocity[std::size_t(old) * dim + d];
+    }
+  kept_velocity.swap(velocity);
+  kept_is_known.swap(known);
+}
+
+template <int dim>
+void ExplicitMPM<dim>::complete_kept_velocity()
+{
+  constexpr unsigned int n = dim + 1;
+  std::vector<double> values(active.size() * n, 0.);
+  const auto take_over = [&]() {
+    active.sum_over_ranks(values.data(), n);
+    for (std::size_t i = 0; i < active.size(); ++i)
+      if (const double weight = values[i * n + dim]; weight > 0.) {
+        kept_is_known[i] = true;
+        for (unsigned int d = 0; d < dim; ++d)
+          kept_velocity[i * dim + d] = values[i * n + d] / weight;
+      }
+  };
+  // What any rank knows.
+  for (std::size_t i = 0; i < active.size(); ++i)
+    if (kept_is_known[i]) {
+      for (unsigned int d = 0; d < dim; ++d)
+        values[i * n + d] = kept_velocity[i * dim + d];
+      values[i * n + dim] = 1.;
+    }
+  take_over();
+
+  // Others begin with the mean of their cells' nodes that have one.
+  const std::vector<char> known = kept_is_known;
+  std::fill(values.begin(), values.end(), 0.);
+  for (const CellId cell : active.occupied_cells()) {
+    const std::uint32_t *cell_nodes = active.cell_nodes(cell);
+    for (unsigned int k = 0; k < active.nodes_per_cell(); ++k)
+      for (unsigned int j = 0; j < active.nodes_per_cell() && !known[cell_nodes[k]]; ++j)
+        if (known[cell_nodes[j]]) {
+          for (unsigned int d = 0; d < dim; ++d)
+            values[cell_nodes[k] * n + d] += kept_velocity[std::size_t(cell_nodes[j]) * dim + d];
+          values[cell_nodes[k] * n + dim] += 1.;
+        }
+  }
+  take_over();
+}
+
+template <int dim>
+double ExplicitMPM<dim>::fastest_on_any_rank() const
+{
+  return dealii::Utilities::MPI::max(findings.largest_speed, grid.communicator());
+}
+
+template <int dim>
+void ExplicitMPM<dim>::aggregate_small_nodes()
+{
+  if (steps_to_aggregation > 0) {
+    --steps_to_aggregation;
+    return;
+  }
+  // Share of the mass of a cell's heaviest node: below that of the corner of a body that fills its cells, 1/8 in 3-D.
+  constexpr double smallest_share = 0.1;
+  active.separate();
+  if (scheme.nodes_keep_velocity)
+    complete_kept_velocity();
+  points_to_nodes();
+  active.aggregate(&nodal.sums[Sums<dim>::mass], nodal.n_sums, smallest_share);
+
+  // Look again when points may have moved by a fiftieth of a cell.
+  const double path = fastest_on_any_rank() * nodal.dt;
+  const double n_steps = path > 0. ? 0.02 * grid.smallest_cell_size() / path : 100.;
+  steps_to_aggregation = std::max(0., std::min(99., n_steps - 1.));
+}
+
+template <int dim>
 void ExplicitMPM<dim>::step(const double dt)
 {
   nodal.time = now;
   nodal.dt = dt;
+  aggregate_small_nodes();
   points_to_nodes();
   add_loads();
   solve_momentum();
@@ -108,7 +193,8 @@ void ExplicitMPM<dim>::points_to_nodes()
 {
   std::fill(nodal.sums.begin(), nodal.sums.end(), 0.);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    kernels[b]->scatter(*scene.bodies[b], active, nodal.sums.data(), nodal.n_sums);
+    kernels[b]->scatter(*scene.bodies[b], active, scheme.nodes_keep_velocity ? kept_velocity.data() : nullptr,
+                        nodal.sums.data(), nodal.n_sums);
   active.sum_over_ranks(nodal.sums.data(), nodal.n_sums);
 }
 
@@ -148,7 +234,7 @@ void ExplicitMPM<dim>::solve_momentum()
     const double inverse = m > 0. ? 1. / m : 0.;
     for (unsigned int d = 0; d < dim; ++d) {
       const std::size_t row = i * dim + d;
-      const double v = sum[S::momentum + d] * inverse;
+      const double v = sum[S::momentum + d] * inverse + (scheme.nodes_keep_velocity ? kept_velocity[row] : 0.);
       double a = (sum[S::force + d] + (has_loads ? nodal.force[row] : 0.)) * inverse + gravity_now[d] * (m > 0.);
       if (scheme.local_damping > 0.)
         a -= scheme.local_damping * std::copysign(a, v) * (v != 0.);
@@ -212,6 +298,11 @@ void ExplicitMPM<dim>::nodes_to_points()
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
   const PressureUpdate pressure{1. - std::exp(-scheme.pressure_filter * nodal.dt)};
   const double *v = nodal.new_velocity.data(), *a = nodal.acceleration.data(), *w = nodal.flux.data();
+  if (scheme.nodes_keep_velocity) {
+    kept_velocity = nodal.new_velocity;
+    for (std::size_t i = 0; i < active.size(); ++i)
+      kept_is_known[i] = nodal.sums[i * nodal.n_sums + Sums<dim>::mass] > 0.;
+  }
   if (scheme.stress_update == SchemeParameters::StressUpdate::last) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b)
       kernels[b]->advance_and_deform(*scene.bodies[b], active, a, v, w, update, pressure, findings);

@@ -5,20 +5,19 @@
 namespace peat {
 SchemeParameters::SchemeParameters(Section section)
 {
-  std::string basis_name = "gimp", transfer = "aflip", update = "usl";
+  std::string basis_name = "gimp", transfer = "dflip", update = "usl";
   section.add("Basis", basis_name, {"q1", "gimp"},
               "Shape functions of the points. 'q1': FE_Q(1), cheapest, for points that stay in their cells. 'gimp': "
               "FE_Q(1) averaged over the point's domain, ten to a hundred times less noise when points cross faces.");
-  section.add("Transfer", transfer, {"flip", "aflip", "tpic", "pic"},
-              "How velocities go from points to nodes and back. 'flip': points add the grid's acceleration. 'aflip': the "
-              "same with the points' velocity gradients on the way to the nodes, which removes the dispersion of FLIP. "
-              "'tpic': points take the grid's velocity and gradient; damps what is shorter than two cells. 'pic': points "
-              "take the grid's velocity; damps strongly.");
+  section.add("Transfer", transfer, {"dflip", "flip", "pic"},
+              "How velocities go from points to nodes and back. 'flip': points add the grid's acceleration. 'dflip': the "
+              "same, but nodes keep their velocity and take up only how the points differ from it, which removes the "
+              "dispersion of FLIP. 'pic': points take the grid's velocity; damps strongly.");
   section.add("Stress update", update, {"usl", "musl"},
               "When stresses follow the velocities. 'usl': from the nodes' new velocities, cheapest. 'musl': from the "
-              "points' new velocities mapped back to the nodes, for bodies whose edges cut through cells.");
+              "points' new velocities mapped back to the nodes, for 'q1' where bodies' edges cut through cells.");
   section.add("Relaxation time", relaxation_time, nonnegative("s"),
-              "Time in which the points' velocities relax to the grid's in 'flip' and 'aflip'; damps noise at a rate that "
+              "Time in which the points' velocities relax to the grid's in 'flip' and 'dflip'; damps noise at a rate that "
               "does not depend on the step. 0: never.");
   section.add("Local damping", local_damping, between(0., 0.99),
               "Share of each node's out-of-balance force that acts against its velocity; for dynamic relaxation to rest.");
@@ -28,8 +27,8 @@ SchemeParameters::SchemeParameters(Section section)
   section.add("Step factor", step_factor, strictly_between(0., 100.), "Step over the stable step.");
   section.add("Time step", fixed_step, nonnegative("s"), "A fixed step; 0 for the automatic one.");
   basis = basis_name == "q1" ? Basis::q1 : Basis::gimp;
-  affine = transfer == "aflip" || transfer == "tpic";
-  grid_velocity = transfer == "pic" || transfer == "tpic";
+  nodes_keep_velocity = transfer == "dflip";
+  grid_velocity = transfer == "pic";
   stress_update = update == "usl" ? StressUpdate::last : StressUpdate::modified_last;
 }
 

@@ -32,35 +32,10 @@ namespace {
   }
 } // namespace
 
-template <int dim, unsigned int reach, bool saturated, bool affine>
-template <typename Row>
-void PointKernels<dim, reach, saturated, affine>::set_affine_field(
-    const Layout &layout, const Batch<Row> &batch, const std::array<CellInterval, dim> &cell,
-    const Weights<dim, reach> &w, const std::array<Lanes, dim> &velocity, AffineField &field)
-{
-  // The middle of the point's domain as its weights see it: with it the point's momentum arrives unchanged, also where
-  // the domain is cut off at the edge of the mesh.
-  std::array<Lanes, dim> middle;
-  for (unsigned int e = 0; e < dim; ++e) {
-    const CellInterval &c = cell[e];
-    middle[e] = w[e].value[reach == 4 ? 2 : 1] * c.size;
-    if constexpr (reach == 4)
-      middle[e] += w[e].value[3] * (c.size + c.size_above) - w[e].value[0] * c.size_below;
-  }
-  for (unsigned int d = 0; d < dim; ++d) {
-    Lanes at_corner = velocity[d];
-    for (unsigned int e = 0; e < dim; ++e) {
-      const Lanes gradient = batch.load(layout.velocity_gradient + dim * d + e);
-      reinterpret_cast<Lanes &>(field.gradient[d][e]) = gradient;
-      at_corner -= gradient * middle[e];
-    }
-    reinterpret_cast<Lanes &>(field.at_corner[d]) = at_corner;
-  }
-}
-
-template <int dim, unsigned int reach, bool saturated, bool affine>
-void PointKernels<dim, reach, saturated, affine>::scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes,
-                                                          double *sums, const unsigned int stride) const
+template <int dim, unsigned int reach, bool saturated>
+void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes,
+                                                  const double *kept, double *sums,
+                                                  const unsigned int stride) const
 {
   using S = Sums<dim>;
   constexpr unsigned int n_sums = saturated ? S::n_saturated : S::n_dry;
@@ -72,23 +47,26 @@ void PointKernels<dim, reach, saturated, affine>::scatter(const Body<dim> &body,
   std::array<Lanes, dim> x;
   Weights<dim, reach> lane_weights;
   // Per point: what the node vectors are multiplied with.
-  alignas(64) double total_stress[6][n_lanes], darcy[3][n_lanes];
+  alignas(64) double momentum[dim][n_lanes], total_stress[6][n_lanes], darcy[3][n_lanes];
+  alignas(64) double local_kept[dim][Chunks::n_nodes];
 
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
-    const NodeOffsets<dim, reach> offsets(cell);
+    const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
+    if (kept)
+      gather(kept, cell_nodes, local_kept);
     alignas(64) NodeLanes local[n_sums][Chunks::n] = {};
 
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, lane_weights);
       const PointwiseWeights<dim, reach> w(lane_weights);
-      AffineField affine_field;
-      if constexpr (affine) {
-        std::array<Lanes, dim> velocity;
-        for (unsigned int d = 0; d < dim; ++d)
-          velocity[d] = batch.load(layout.velocity + d);
-        set_affine_field(layout, batch, cell, lane_weights, velocity, affine_field);
+      const Lanes m = batch.load(layout.mass);
+      for (unsigned int d = 0; d < dim; ++d) {
+        Lanes v = batch.load(layout.velocity + d);
+        if (kept)
+          v -= interpolate<dim, reach>(local_kept[d], lane_weights);
+        reinterpret_cast<Lanes &>(momentum[d]) = m * v;
       }
       const Lanes V = batch.load(layout.volume);
       Lanes alpha_p = broadcast(0.);
@@ -110,16 +88,10 @@ void PointKernels<dim, reach, saturated, affine>::scatter(const Body<dim> &body,
         for (unsigned int c = 0; c < n_sums; ++c)
           sum[c] = local[c][chunk];
         for (unsigned int l = 0; l < batch.n; ++l) {
-          const double *row = batch.row[l];
           const ShapeAtNodes<dim, reach> shape(w, l, chunk);
-          const NodeLanes mN = row[layout.mass] * shape.N;
-          sum[S::mass] += mN;
-          for (unsigned int d = 0; d < dim; ++d) {
-            if constexpr (affine)
-              sum[S::momentum + d] += mN * affine_velocity(affine_field, offsets, d, l, chunk);
-            else
-              sum[S::momentum + d] += row[layout.velocity + d] * mN;
-          }
+          sum[S::mass] += m[l] * shape.N;
+          for (unsigned int d = 0; d < dim; ++d)
+            sum[S::momentum + d] += momentum[d][l] * shape.N;
           if constexpr (dim == 2) {
             sum[S::force] -= total_stress[0][l] * shape.dN[0] + total_stress[3][l] * shape.dN[1];
             sum[S::force + 1] -= total_stress[3][l] * shape.dN[0] + total_stress[1][l] * shape.dN[1];
@@ -143,7 +115,6 @@ void PointKernels<dim, reach, saturated, affine>::scatter(const Body<dim> &body,
       }
     }
 
-    const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     for (unsigned int i = 0; i < Chunks::n_nodes; ++i) {
       double *out = sums + std::size_t(cell_nodes[i]) * stride;
       for (unsigned int c = 0; c < n_sums; ++c)
@@ -152,8 +123,8 @@ void PointKernels<dim, reach, saturated, affine>::scatter(const Body<dim> &body,
   }
 }
 
-template <int dim, unsigned int reach, bool saturated, bool affine>
-void PointKernels<dim, reach, saturated, affine>::advance(const Body<dim> &body, const Batch<double> &batch,
+template <int dim, unsigned int reach, bool saturated>
+void PointKernels<dim, reach, saturated>::advance(const Body<dim> &body, const Batch<double> &batch,
                                                           const Weights<dim, reach> &w,
                                                           const double (*a)[Chunks::n_nodes],
                                                           const double (*v)[Chunks::n_nodes],
@@ -172,8 +143,8 @@ void PointKernels<dim, reach, saturated, affine>::advance(const Body<dim> &body,
   }
 }
 
-template <int dim, unsigned int reach, bool saturated, bool affine>
-void PointKernels<dim, reach, saturated, affine>::advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes,
+template <int dim, unsigned int reach, bool saturated>
+void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                                     const double *a, const double *v,
                                                                     const VelocityUpdate &update,
                                                                     double *momentum) const
@@ -186,7 +157,6 @@ void PointKernels<dim, reach, saturated, affine>::advance_and_remap(Body<dim> &b
 
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
-    const NodeOffsets<dim, reach> offsets(cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(a, cell_nodes, local_a);
     gather(v, cell_nodes, local_v);
@@ -197,17 +167,11 @@ void PointKernels<dim, reach, saturated, affine>::advance_and_remap(Body<dim> &b
       evaluate(body, batch, cell, x, lane_weights);
       advance(body, batch, lane_weights, local_a, local_v, update, velocity);
       const PointwiseWeights<dim, reach> w(lane_weights);
-      AffineField affine_field;
-      if constexpr (affine)
-        set_affine_field(layout, batch, cell, lane_weights, velocity, affine_field);
       for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk)
         for (unsigned int l = 0; l < batch.n; ++l) {
           const NodeLanes mN = batch.row[l][layout.mass] * ShapeAtNodes<dim, reach>::value(w, l, chunk);
           for (unsigned int d = 0; d < dim; ++d)
-            if constexpr (affine)
-              local[d][chunk] += mN * affine_velocity(affine_field, offsets, d, l, chunk);
-            else
-              local[d][chunk] += mN * velocity[d][l];
+            local[d][chunk] += mN * velocity[d][l];
         }
     }
     for (unsigned int i = 0; i < Chunks::n_nodes; ++i)
@@ -216,8 +180,8 @@ void PointKernels<dim, reach, saturated, affine>::advance_and_remap(Body<dim> &b
   }
 }
 
-template <int dim, unsigned int reach, bool saturated, bool affine>
-void PointKernels<dim, reach, saturated, affine>::deform_batch(
+template <int dim, unsigned int reach, bool saturated>
+void PointKernels<dim, reach, saturated>::deform_batch(
     Body<dim> &body, const Batch<double> &batch, const std::array<CellInterval, dim> &cell,
     const std::array<Lanes, dim> &x, const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
     const double (*w)[Chunks::n_nodes], const double dt, StepFindings &findings)
@@ -234,11 +198,8 @@ void PointKernels<dim, reach, saturated, affine>::deform_batch(
     interpolate<dim, reach>(v[d], weights, velocity[d], gradient);
     speed_squared += velocity[d] * velocity[d];
     divergence += gradient[d];
-    for (unsigned int e = 0; e < dim; ++e) {
+    for (unsigned int e = 0; e < dim; ++e)
       du[3 * d + e] = dt * gradient[e];
-      if constexpr (affine)
-        batch.store(layout.velocity_gradient + dim * d + e, gradient[e]);
-    }
   }
 
   StressLanes stress = {};
@@ -308,8 +269,8 @@ void PointKernels<dim, reach, saturated, affine>::deform_batch(
   findings.largest_speed = std::max(findings.largest_speed, fastest);
 }
 
-template <int dim, unsigned int reach, bool saturated, bool affine>
-void PointKernels<dim, reach, saturated, affine>::filter_pressure(Body<dim> &body, const Slice &slice,
+template <int dim, unsigned int reach, bool saturated>
+void PointKernels<dim, reach, saturated>::filter_pressure(Body<dim> &body, const Slice &slice,
                                                                   const double share)
 {
   const Layout &layout = body.layout();
@@ -332,8 +293,8 @@ void PointKernels<dim, reach, saturated, affine>::filter_pressure(Body<dim> &bod
   }
 }
 
-template <int dim, unsigned int reach, bool saturated, bool affine>
-void PointKernels<dim, reach, saturated, affine>::deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
+template <int dim, unsigned int reach, bool saturated>
+void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                          const double *v, const double *w, const double dt,
                                                          const PressureUpdate &pressure,
                                                          StepFindings &findings) const
@@ -358,8 +319,8 @@ void PointKernels<dim, reach, saturated, affine>::deform(Body<dim> &body, const 
   }
 }
 
-template <int dim, unsigned int reach, bool saturated, bool affine>
-void PointKernels<dim, reach, saturated, affine>::advance_and_deform(
+template <int dim, unsigned int reach, bool saturated>
+void PointKernels<dim, reach, saturated>::advance_and_deform(
     Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v, const double *w,
     const VelocityUpdate &update, const PressureUpdate &pressure, StepFindings &findings) const
 {
@@ -387,22 +348,20 @@ void PointKernels<dim, reach, saturated, affine>::advance_and_deform(
 
 namespace {
   template <int dim, unsigned int reach>
-  std::unique_ptr<Kernels<dim>> make_for(const bool saturated, const bool affine)
+  std::unique_ptr<Kernels<dim>> make_for(const bool saturated)
   {
     if (saturated)
-      return affine ? std::unique_ptr<Kernels<dim>>(std::make_unique<PointKernels<dim, reach, true, true>>())
-                    : std::make_unique<PointKernels<dim, reach, true, false>>();
-    return affine ? std::unique_ptr<Kernels<dim>>(std::make_unique<PointKernels<dim, reach, false, true>>())
-                  : std::make_unique<PointKernels<dim, reach, false, false>>();
+      return std::make_unique<PointKernels<dim, reach, true>>();
+    return std::make_unique<PointKernels<dim, reach, false>>();
   }
 } // namespace
 
 template <int dim>
-std::unique_ptr<Kernels<dim>> Kernels<dim>::make(const Basis basis, const bool saturated, const bool affine)
+std::unique_ptr<Kernels<dim>> Kernels<dim>::make(const Basis basis, const bool saturated)
 {
-  return basis == Basis::q1 ? make_for<dim, 2>(saturated, affine) : make_for<dim, 4>(saturated, affine);
+  return basis == Basis::q1 ? make_for<dim, 2>(saturated) : make_for<dim, 4>(saturated);
 }
 
-template std::unique_ptr<Kernels<2>> Kernels<2>::make(Basis, bool, bool);
-template std::unique_ptr<Kernels<3>> Kernels<3>::make(Basis, bool, bool);
+template std::unique_ptr<Kernels<2>> Kernels<2>::make(Basis, bool);
+template std::unique_ptr<Kernels<3>> Kernels<3>::make(Basis, bool);
 } // namespace peat

@@ -5,12 +5,12 @@
 #include "scatter.h"
 
 namespace peat {
-/// The kernels for one combination of basis, phases and transfer.
-template <int dim, unsigned int reach, bool saturated, bool affine>
+/// The kernels for one combination of basis and phases.
+template <int dim, unsigned int reach, bool saturated>
 class PointKernels : public Kernels<dim>
 {
 public:
-  void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, double *sums,
+  void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const double *kept, double *sums,
                const unsigned int stride) const override;
   void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
                          const VelocityUpdate &update, double *momentum) const override;
@@ -66,25 +66,6 @@ private:
     for (unsigned int d = 0; d < dim; ++d)
       result[d] = CellInterval::of(nodes.grid(), cell, d);
     return result;
-  }
-
-  /// The affine velocity field of each point of a batch: v(x) = at_corner + gradient (x - lower corner of the cell).
-  struct AffineField
-  {
-    alignas(64) double at_corner[dim][n_lanes];
-    alignas(64) double gradient[dim][dim][n_lanes];
-  };
-  template <typename Row>
-  static void set_affine_field(const Layout &layout, const Batch<Row> &batch,
-                               const std::array<CellInterval, dim> &cell, const Weights<dim, reach> &w,
-                               const std::array<Lanes, dim> &velocity, AffineField &field);
-  static NodeLanes affine_velocity(const AffineField &field, const NodeOffsets<dim, reach> &offsets,
-                                   const unsigned int d, const unsigned int point, const unsigned int chunk)
-  {
-    NodeLanes v = field.at_corner[d][point] + field.gradient[d][0][point] * offsets.x[chunk][0];
-    for (unsigned int e = 1; e < dim; ++e)
-      v += field.gradient[d][e][point] * offsets.x[chunk][e];
-    return v;
   }
 
   template <typename Row>

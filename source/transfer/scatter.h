@@ -105,22 +105,4 @@ struct ShapeAtNodes
   }
 };
 
-/// Coordinates of a cell's reachable nodes, relative to the cell's lower corner.
-template <int dim, unsigned int reach>
-struct NodeOffsets
-{
-  using Chunks = NodeChunks<dim, reach>;
-  std::array<std::array<typename Chunks::Vector, dim>, Chunks::n> x;
-
-  explicit NodeOffsets(const std::array<CellInterval, dim> &cell)
-  {
-    for (unsigned int d = 0; d < dim; ++d) {
-      const CellInterval &c = cell[d];
-      const double offsets[4] = {reach == 2 ? 0. : -c.size_below, reach == 2 ? c.size : 0., c.size,
-                                 c.size + c.size_above};
-      for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk)
-        x[chunk][d] = Chunks::spread(offsets, d, chunk);
-    }
-  }
-};
 } // namespace peat

@@ -4,11 +4,12 @@
 #define BOOST_TEST_MODULE output
 #include <boost/test/included/unit_test.hpp>
 
+#include "output_scene.h"
+
 #include <peat/simulation/comparison.h>
 #include <peat/simulation/pictures.h>
 #include <peat/simulation/probes.h>
 #include <peat/simulation/projection.h>
-#include <peat/simulation/simulation.h>
 #include <peat/simulation/table.h>
 
 #include <deal.II/base/mpi.h>
@@ -22,187 +23,9 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
-#include <unistd.h>
-
-using namespace peat;
 
 namespace {
-const MPI_Comm comm = MPI_COMM_WORLD;
-
-struct Mpi
-{
-  Mpi()
-      : init(boost::unit_test::framework::master_test_suite().argc,
-             boost::unit_test::framework::master_test_suite().argv, 1)
-  {
-  }
-  dealii::Utilities::MPI::MPI_InitFinalize init;
-};
-
-unsigned int rank()
-{
-  return dealii::Utilities::MPI::this_mpi_process(comm);
-}
-
-/// The current directory of all ranks while it lives.
-class Directory
-{
-public:
-  Directory() : before(std::filesystem::current_path())
-  {
-    const int id = dealii::Utilities::MPI::broadcast(comm, int(getpid()));
-    path = std::filesystem::temp_directory_path() / ("peat_output_" + std::to_string(id));
-    std::filesystem::create_directories(path);
-    std::filesystem::current_path(path);
-  }
-  ~Directory()
-  {
-    MPI_Barrier(comm);
-    std::filesystem::current_path(before);
-    if (rank() == 0)
-      std::filesystem::remove_all(path);
-    MPI_Barrier(comm);
-  }
-
-private:
-  std::filesystem::path before, path;
-};
-
-void write_file(const std::string &name, const std::string &text)
-{
-  if (rank() == 0) {
-    std::filesystem::remove(name);
-    std::ofstream(name) << text;
-  }
-  MPI_Barrier(comm);
-}
-
-std::string read_file(const std::string &name)
-{
-  std::ifstream file(name, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-std::string message_of(const std::function<void()> &action)
-{
-  try {
-    action();
-  } catch (const InputError &error) {
-    return error.what();
-  }
-  return "";
-}
-
-bool contains(const std::string &text, const std::string &part)
-{
-  return text.find(part) != std::string::npos;
-}
-
-/// A saturated ground (finite strain if so asked) and, beside it, a dry block; all sizes in cells of 1/n.
-template <int dim>
-std::string scene_text(const unsigned int n, const std::string &law, const std::string &more)
-{
-  std::ostringstream text;
-  text << "set Dimension = " << dim << "\nsubsection Constants\n  set n = " << n << "\nend\n"
-       << "subsection Grid\n  set Lower corner = " << (dim == 2 ? "0, 0" : "0, 0, 0")
-       << "\n  set Upper corner = " << (dim == 2 ? "2, 2" : "2, 2, 2")
-       << "\n  set Cells = " << (dim == 2 ? "2*n, 2*n" : "2*n, 2*n, 2*n") << "\nend\n"
-       << "subsection Materials\n  subsection sand\n    set Law = " << law << "\n    set Porosity = 0.4\n"
-       << "    set Hydraulic conductivity = 1e-4\n  end\n  subsection steel\n    set Density = 7850\n  end\nend\n"
-       << "subsection Bodies\n  subsection ground\n    set Material = sand\n    set Shape = "
-       << (dim == 2 ? "box(0, 0, 1, 1)" : "box(0, 0, 0, 1, 1, 1)")
-       << "\n  end\n  subsection block\n    set Material = steel\n    set Shape = "
-       << (dim == 2 ? "ball(1.5, 1.5, 0.4)" : "ball(1.5, 1.5, 1.5, 0.4)") << "\n  end\nend\n"
-       << "subsection Stages\n  subsection run\n    set Duration = 1\n  end\nend\n"
-       << more;
-  return text.str();
-}
-
-template <int dim>
-struct World
-{
-  World(const unsigned int n, const std::string &more = "", const std::string &law = "linear elastic")
-      : World(make_case(scene_text<dim>(n, law, more)))
-  {
-  }
-
-  explicit World(std::unique_ptr<Case<dim>> given)
-      : parameters(std::move(given)), grid(parameters->grid, comm), scene(make_scene(*parameters, grid)),
-        nodes(grid, static_cast<unsigned int>(parameters->scheme.basis))
-  {
-    std::vector<CellId> cells;
-    for (const auto &body : scene.bodies)
-      for (const Slice &slice : body->slices())
-        cells.push_back(slice.cell);
-    std::sort(cells.begin(), cells.end());
-    cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
-    nodes.rebuild(cells);
-    fields.flux.assign(std::size_t(nodes.size()) * dim, 0.25);
-  }
-
-  static std::unique_ptr<Case<dim>> make_case(const std::string &text)
-  {
-    write_file("case.prm", text);
-    file() = std::make_unique<ParameterFile>("case.prm", std::vector<std::string>());
-    BOOST_REQUIRE(read_dimension(*file()) == dim);
-    return std::make_unique<Case<dim>>(*file());
-  }
-  static std::unique_ptr<ParameterFile> &file()
-  {
-    static std::unique_ptr<ParameterFile> one;
-    return one;
-  }
-
-  std::vector<const Body<dim> *> bodies() const
-  {
-    std::vector<const Body<dim> *> list;
-    for (const auto &body : scene.bodies)
-      list.push_back(body.get());
-    return list;
-  }
-
-  /// Give all points of all bodies a pressure (if they have one) and the same value as effective stress yy and velocity
-  /// x; `at_cell_centre`: constant in each cell, as u-p schemes leave the pressure.
-  void set(const std::function<double(const dealii::Point<dim> &)> &f, const bool at_cell_centre = false)
-  {
-    for (const auto &body : scene.bodies)
-      for (const std::uint32_t handle : body->handles()) {
-        const dealii::Point<dim> &x = body->position(handle);
-        dealii::Point<dim> centre;
-        for (unsigned int d = 0; d < dim; ++d)
-          centre[d] = grid.lower(body->cell(handle), d) + 0.5 * grid.size(body->cell(handle), d);
-        const double value = f(at_cell_centre ? centre : x);
-        double *row = body->row(handle);
-        row[body->layout().stress + 1] = value;
-        row[body->layout().velocity] = value;
-        if (body->layout().pressure >= 0)
-          row[body->layout().pressure] = value;
-      }
-  }
-
-  std::unique_ptr<Case<dim>> parameters;
-  Grid<dim> grid;
-  Scene<dim> scene;
-  ActiveNodes<dim> nodes;
-  NodalFields<dim> fields;
-};
-
-template <int dim>
-double linear(const dealii::Point<dim> &x)
-{
-  return 3. + 2. * x[0] - 5. * x[1] + (dim == 3 ? 4. * x[dim - 1] : 0.);
-}
-
-template <int dim>
-double wave(const dealii::Point<dim> &x)
-{
-  return std::sin(2. * x[0] + 0.3) * std::cos(1.5 * x[1]) * (dim == 3 ? std::exp(0.5 * x[dim - 1]) : 1.);
-}
-
 /// Largest error of the projection of one body's field over the nodes.
 template <int dim>
 double projection_error(const World<dim> &world, const Body<dim> &body, const std::string &field,
@@ -269,7 +92,8 @@ BOOST_AUTO_TEST_CASE(unknown_fields)
   };
   BOOST_TEST(contains(reference("set Field = presure"), "did you mean 'pressure'"));
   BOOST_TEST(contains(reference("set Field = presure"), "case.prm:"));
-  BOOST_TEST(contains(reference("set Field = pressure\nset Body = block"), "body 'block' has no field 'pressure'"));
+  BOOST_TEST(
+      contains(reference("set Field = pressure\nset Body = block"), "body 'block' has no field 'pressure'"));
   BOOST_TEST(contains(reference("set Field = pressure\nset Body = grund"), "did you mean 'ground'"));
   BOOST_TEST(contains(reference("set Field = pressure\nset Times = 2"), "the run ends at 1 s"));
   BOOST_TEST(reference("set Field = pressure\nset Body = ground") == "");
@@ -343,7 +167,8 @@ BOOST_AUTO_TEST_CASE(tables)
   const Directory directory;
   write_file("good.csv", "# comment, with comma\nz [m],p(T=0.1) [Pa]\r\n1,10\n\n# more\n0, 0\n2,\n3,30\n");
   const Table table("good.csv");
-  BOOST_TEST(table.names() == (std::vector<std::string>{"z [m]", "p(T=0.1) [Pa]"}), boost::test_tools::per_element());
+  BOOST_TEST(table.names() == (std::vector<std::string>{"z [m]", "p(T=0.1) [Pa]"}),
+             boost::test_tools::per_element());
   const Curve curve(table.column("z [m]"), table.column("p(T=0.1) [Pa]"));
   BOOST_TEST(curve.lower() == 0.);
   BOOST_TEST(curve.upper() == 3.);
@@ -378,9 +203,8 @@ BOOST_AUTO_TEST_CASE(interpolation)
     return largest;
   };
   const auto smooth = [](const double x) { return std::cos(1.5 * x); };
-  BOOST_TEST_MESSAGE("interpolation of cos(1.5 x), 20, 40, 80 intervals: " << error(20, smooth) << ' '
-                                                                         << error(40, smooth) << ' '
-                                                                         << error(80, smooth));
+  BOOST_TEST_MESSAGE("interpolation of cos(1.5 x), 20, 40, 80 intervals: "
+                     << error(20, smooth) << ' ' << error(40, smooth) << ' ' << error(80, smooth));
   BOOST_TEST(error(40, smooth) < 2e-7);
   const auto front = [](const double x) { return std::min(1., std::max(0., 5. * (x - 0.5))); };
   BOOST_TEST_MESSAGE("interpolation of a ramp with kinks, 40 intervals: " << error(40, front));
@@ -440,7 +264,8 @@ BOOST_AUTO_TEST_CASE(probes)
   BOOST_TEST(probes.value("inside", "pressure") == at(0.53, 0.41), boost::test_tools::tolerance(1e-12));
   BOOST_TEST(probes.value("top, middle", "pressure") == at(0.5, 1.), boost::test_tools::tolerance(1e-12));
   BOOST_TEST(probes.value("corner", "velocity x") == at(1., 1.), boost::test_tools::tolerance(1e-12));
-  BOOST_TEST(probes.value("block", "effective stress yy") == at(1.5, 1.5), boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(probes.value("block", "effective stress yy") == at(1.5, 1.5),
+             boost::test_tools::tolerance(1e-12));
   BOOST_TEST(probes.value("place", "velocity x") == at(0.3, 0.3), boost::test_tools::tolerance(1e-12));
   BOOST_TEST(std::abs(probes.value("inside", "total stress yy")) < 1e-12);
   BOOST_TEST(probes.value("corner", "x") == 1.);
@@ -463,9 +288,11 @@ BOOST_AUTO_TEST_CASE(probes)
     std::getline(file, head);
     std::getline(file, first);
     std::getline(file, second);
-    BOOST_TEST(head.rfind("time [s],inside/x [m],inside/y [m],inside/displacement x [m],inside/displacement y [m],"
-                          "inside/velocity x [m/s],inside/velocity y [m/s],inside/pressure [Pa],"
-                          "inside/effective stress xx [Pa],", 0) == 0);
+    BOOST_TEST(
+        head.rfind("time [s],inside/x [m],inside/y [m],inside/displacement x [m],inside/displacement y [m],"
+                   "inside/velocity x [m/s],inside/velocity y [m/s],inside/pressure [Pa],"
+                   "inside/effective stress xx [Pa],",
+                   0) == 0);
     BOOST_TEST(contains(head, ",\"top, middle/x [m]\","));
     BOOST_TEST(contains(head, "total stress yy [Pa]"));
     BOOST_TEST(count(first, ',') + 12 == count(head, ',')); // a comma in a name
@@ -505,7 +332,8 @@ BOOST_AUTO_TEST_CASE(histories)
   BOOST_TEST(result.norms.n == 3u);
   BOOST_TEST(result.norms.n_outside == 1u);
   BOOST_TEST(result.norms.L1 == (0.125 * 2. + 0.625 * 4.) / 0.75, boost::test_tools::tolerance(1e-12));
-  BOOST_TEST(result.norms.L2 == std::sqrt((0.125 * 4. + 0.625 * 16.) / 0.75), boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(result.norms.L2 == std::sqrt((0.125 * 4. + 0.625 * 16.) / 0.75),
+             boost::test_tools::tolerance(1e-12));
   BOOST_TEST(result.norms.Linf == 4., boost::test_tools::tolerance(1e-12));
   BOOST_TEST(result.unit == "Pa");
 }
@@ -557,7 +385,8 @@ end
   BOOST_TEST(results[0].norms.n == 32u);
   BOOST_TEST(results[0].norms.worst_time == 1.);
   BOOST_TEST(results[1].norms.Linf < 1e-12);
-  BOOST_TEST(results[1].norms.n == 16u + dealii::Utilities::MPI::sum(world.scene.bodies[1]->slices().size(), comm));
+  BOOST_TEST(results[1].norms.n ==
+             16u + dealii::Utilities::MPI::sum(world.scene.bodies[1]->slices().size(), comm));
   BOOST_TEST(results[2].norms.Linf < 1e-14);
   BOOST_TEST(results[2].norms.n == ground.n_global_points());
   if (rank() == 0) {
@@ -569,14 +398,17 @@ end
 
   const auto error = [](const std::string &lines) {
     return message_of([&] {
-      World<2> other(2, "subsection References\n  subsection r\n    set Kind = profile\n    set Field = pressure\n"
-                        "    set Times = 1\n" + lines + "\n  end\nend\n");
+      World<2> other(
+          2, "subsection References\n  subsection r\n    set Kind = profile\n    set Field = pressure\n"
+             "    set Times = 1\n" +
+                 lines + "\n  end\nend\n");
       Comparison<2> comparison(*other.parameters, ".");
     });
   };
   BOOST_TEST(contains(error("set File = none.csv\nset Columns = a"), "cannot open the table './none.csv'"));
   BOOST_TEST(contains(error("set File = profile.csv\nset Columns = wong [Pa]"), "did you mean 'wrong [Pa]'"));
-  BOOST_TEST(contains(error("set File = profile.csv\nset Columns = wrong [Pa]\nset Coordinate = z"), "no column 'z'"));
+  BOOST_TEST(contains(error("set File = profile.csv\nset Columns = wrong [Pa]\nset Coordinate = z"),
+                      "no column 'z'"));
 }
 
 namespace {
@@ -590,7 +422,8 @@ std::vector<float> decode(const std::string &text)
   const auto data = dealii::Utilities::decode_base64(text.substr(24));
   std::vector<float> numbers(sizes[1] / sizeof(float));
   uLongf length = sizes[1];
-  BOOST_REQUIRE(uncompress(reinterpret_cast<Bytef *>(numbers.data()), &length, data.data(), data.size()) == Z_OK);
+  BOOST_REQUIRE(uncompress(reinterpret_cast<Bytef *>(numbers.data()), &length, data.data(), data.size()) ==
+                Z_OK);
   return numbers;
 }
 
@@ -608,7 +441,8 @@ std::vector<float> array(const std::string &file, const std::string &name, std::
     for (const auto &[kind, data] : piece.get_child("PointData"))
       if (kind == "DataArray" && data.get<std::string>("<xmlattr>.Name") == name) {
         std::string text = data.data();
-        text.erase(std::remove_if(text.begin(), text.end(), [](unsigned char c) { return std::isspace(c); }), text.end());
+        text.erase(std::remove_if(text.begin(), text.end(), [](unsigned char c) { return std::isspace(c); }),
+                   text.end());
         const auto part = decode(text);
         numbers.insert(numbers.end(), part.begin(), part.end());
       }

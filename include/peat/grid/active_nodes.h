@@ -35,9 +35,22 @@ public:
   bool is_occupied(const CellId cell) const { return slot[cell] != no_index; }
   const std::vector<CellId> &occupied_cells() const { return cells; }
 
+  /// Let each cell use, instead of a node that has little mass beside the cell's heaviest one, that node's nearest
+  /// neighbour in the cell with enough (aggregation). The shape function of the one is thereby added to the other's,
+  /// for all sums and all interpolations in this cell: partition of unity, momentum and work are kept, and a sliver of
+  /// material in a cell accelerates with the body it belongs to instead of limiting the step.
+  ///
+  /// @param mass one value a node, `stride` apart, from sums that were made without aggregation
+  /// @return whether any cell of this rank does so
+  bool aggregate(const double *mass, unsigned int stride, double smallest_share);
+  /// Each cell uses its own nodes again.
+  void separate();
+
   const dealii::Point<dim> &position(const unsigned int i) const { return positions[i]; }
   const Grid<dim> &grid() const { return background; }
   NodeId grid_node(const unsigned int i) const { return node[i]; }
+  /// Number of a node before the last rebuild, or no_index if it was not active.
+  std::uint32_t previous_index(const unsigned int i) const { return old_index[node[i]]; }
   /// Each node is counted by one rank in sums over nodes.
   bool is_owned(const unsigned int i) const { return owned[i]; }
   /// Active nodes on a face of the mesh (0 left, 1 right, ...).
@@ -57,6 +70,9 @@ private:
   void number_nodes(const std::vector<CellId> &occupied_cells);
   void make_exchange();
   unsigned int add(NodeId grid_node);
+  unsigned int nearest_heavy_node(const std::array<double, 1 << dim> &own_mass, unsigned int local,
+                                  double least_mass) const;
+  unsigned int own_node(unsigned int vertex) const;
 
   const Grid<dim> &background;
   const unsigned int reach;
@@ -66,8 +82,11 @@ private:
   std::vector<CellId> cells;
   std::vector<std::uint32_t> slot;
   std::vector<std::uint32_t> table;
+  std::vector<std::uint32_t> separate_table;
   std::vector<NodeId> node;
-  std::vector<std::uint32_t> active_index;
+  std::vector<std::uint32_t> active_index; ///< by NodeId
+  std::vector<std::uint32_t> old_index;    ///< by NodeId
+  std::vector<NodeId> old_nodes;
   std::vector<dealii::Point<dim>> positions;
   std::vector<char> owned;
   std::array<std::vector<std::uint32_t>, 2 * dim> boundary_nodes;

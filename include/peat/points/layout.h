@@ -12,7 +12,6 @@ constexpr unsigned int max_state_columns = 32;
 /// What a scheme needs stored with the points beyond what the material asks for.
 struct SchemeFields
 {
-  bool velocity_gradient = false;
   bool extent = false;
 };
 
@@ -53,7 +52,6 @@ struct Layout
   int stress = -1;            ///< effective Cauchy stress [Pa]
   int pressure = -1;          ///< pore pressure [Pa]; saturated bodies
   int porosity = -1;          ///< [-]; saturated bodies under finite strain (constant otherwise)
-  int velocity_gradient = -1; ///< [1/s], dim * dim, row by row; affine transfer
   int extent = -1;            ///< half the edge lengths of the point's domain [m]; GIMP
   int state = -1;             ///< what the law remembers
   unsigned int n_state = 0;   ///< number of columns of the law's memory

@@ -34,19 +34,20 @@ private:
   std::function<double(const double *)> get;
 };
 
-/// Throws an InputError at `key` of the section unless the body (with body = "": any body of the case) has the field;
-/// the message suggests what there is. Also if there is no such body.
+/// Throws an InputError at `key` of the section unless the body (with body = "": any body of the case) has
+/// the field; the message suggests what there is. Also if there is no such body.
 template <int dim>
 void require_field(const Case<dim> &parameters, const std::string &body, const std::string &field,
                    const Section &section, const std::string &key);
 
-/// Add the volumes of the points of a slice, volume times position, and volume times each field (available ones).
+/// Add the volumes of the points of a slice, volume times position, and volume times each field (available
+/// ones).
 template <int dim>
-void integrate(const Body<dim> &body, const Slice &slice, const std::vector<FieldAccess> &fields, double &volume,
-               dealii::Point<dim> &moment, double *sums);
+void integrate(const Body<dim> &body, const Slice &slice, const std::vector<FieldAccess> &fields,
+               double &volume, dealii::Point<dim> &moment, double *sums);
 
-/// Means over the points of a cell, weighted with their volumes. This is how fields that jump from cell to cell, above
-/// all the pore pressure, are second-order accurate: at the centroid.
+/// Means over the points of a cell, weighted with their volumes. This is how fields that jump from cell to
+/// cell, above all the pore pressure, are second-order accurate: at the centroid.
 template <int dim>
 struct CellMeans
 {
@@ -57,10 +58,14 @@ struct CellMeans
   std::vector<double> values; ///< n_fields a cell
 
   std::size_t size() const { return cell.size(); }
-  double value(const std::size_t entry, const unsigned int field) const { return values[entry * n_fields + field]; }
+  double value(const std::size_t entry, const unsigned int field) const
+  {
+    return values[entry * n_fields + field];
+  }
 };
 
 /// Of these fields, over the points of those bodies that have all of them. No communication.
 template <int dim>
-CellMeans<dim> cell_means(const std::vector<const Body<dim> *> &bodies, const std::vector<std::string> &fields);
+CellMeans<dim> cell_means(const std::vector<const Body<dim> *> &bodies,
+                          const std::vector<std::string> &fields);
 } // namespace peat

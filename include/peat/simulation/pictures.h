@@ -7,14 +7,14 @@
 #include <vector>
 
 namespace peat {
-/// Pictures for ParaView: `solution.pvd`, which lists for each time `pictures/grid-0003.vtu` (the cells that hold
-/// material) and `pictures/BODY-0003.vtu` for each body (its points). Each file is written by all ranks together,
-/// compressed, in single precision.
+/// Pictures for ParaView: `solution.pvd`, which lists for each time `pictures/grid-0003.vtu` (the cells that
+/// hold material) and `pictures/BODY-0003.vtu` for each body (its points). Each file is written by all ranks
+/// together, compressed, in single precision.
 ///
-/// The grid shows velocity, displacement and effective stress of all bodies together, and pressure and flux (as the
-/// last step left it; zero if the nodes were numbered anew since) where there is pore fluid; all but the flux are
-/// projections of the points (NodalProjection). Points show every stored field and their ids. Stresses and deformation
-/// gradients are full tensors.
+/// The grid shows velocity, displacement and effective stress of all bodies together, and pressure and flux
+/// (as the last step left it; zero if the nodes were numbered anew since) where there is pore fluid; all but
+/// the flux are projections of the points (NodalProjection). Points show every stored field and their ids.
+/// Stresses and deformation gradients are full tensors.
 template <int dim>
 class Pictures
 {
@@ -39,7 +39,7 @@ private:
   void write_points(double time, const Body<dim> &body);
   /// "pictures/NAME-0003.vtu", noted for solution.pvd.
   std::string add_entry(double time, const std::string &name);
-  void write_list() const;
+  bool write_list() const;
 
   const std::string directory;
   const Scene<dim> &scene;

@@ -10,21 +10,22 @@
 namespace peat {
 /// Records fields at the probes: probes.csv, one line a call.
 ///
-/// Position and displacement of a probe that follows the material are those of its tracer. All other fields are linear
-/// fits (LinearFit) through means over the cells around the probe, of one body: for a probe that follows, the body it
-/// was in at the start; for one that stays, the body that now fills most of the cells it touches. There is no value
-/// where there is no material.
+/// Position and displacement of a probe that follows the material are those of its tracer. All other fields
+/// are linear fits (LinearFit) through means over the cells around the probe, of one body: for a probe that
+/// follows, the body it was in at the start; for one that stays, the body that now fills most of the cells it
+/// touches. There is no value where there is no material.
 ///
-/// Velocities come from the points, too, weighted with their volumes: nodal velocities are renumbered and zero after a
-/// step in which points have entered new cells.
+/// Velocities come from the points, too, weighted with their volumes: nodal velocities are renumbered and
+/// zero after a step in which points have entered new cells.
 template <int dim>
 class ProbeWriter
 {
 public:
-  /// Opens the file on the first rank and writes the line of names: "time [s]", then for each probe "NAME/x [m]", ...,
-  /// "NAME/displacement x [m]", "NAME/velocity x [m/s]", "NAME/pressure [Pa]" (saturated cases), "NAME/effective stress
-  /// xx [Pa]", ..., and what histories in `References` ask for beyond these. The bodies and tracers (whose ids are the
-  /// numbers of the probes) are those of `scene`, which must live as long as this.
+  /// Collective. Opens the file on the first rank and writes the line of names: "time [s]", then for each
+  /// probe "NAME/x [m]", ..., "NAME/displacement x [m]", "NAME/velocity x [m/s]", "NAME/pressure [Pa]"
+  /// (saturated cases), "NAME/effective stress xx [Pa]", ..., and what histories in `References` ask for
+  /// beyond these. The bodies and tracers (whose ids are the numbers of the probes) are those of `scene`,
+  /// which must live as long as this.
   ProbeWriter(const Case<dim> &parameters, const Scene<dim> &scene, const Grid<dim> &grid,
               const std::string &file_name);
 
@@ -48,11 +49,11 @@ private:
   void write_header();
   /// Where each probe is: 1 if anybody knows, position, displacement; n_place numbers a probe.
   std::vector<double> find_places() const;
-  /// For each probe and body: volume in the cells that the probe touches, moments of places, and for each field sum w f,
-  /// sum w d f; summed over the ranks.
+  /// For each probe and body: volume in the cells that the probe touches, moments of places, and for each
+  /// field sum w f, sum w d f; summed over the ranks.
   std::vector<double> sum_moments(const std::vector<double> &places) const;
-  void add_cell(CellId cell, const dealii::Point<dim> &x, const dealii::Tensor<1, dim> &size, unsigned int body,
-                double *sums) const;
+  void add_cell(CellId cell, const dealii::Point<dim> &x, const dealii::Tensor<1, dim> &size,
+                unsigned int body, double *sums) const;
   int choose_body(const Probe &probe, const double *sums) const;
   void evaluate(const Probe &probe, const double *place, const double *sums, double *result) const;
 

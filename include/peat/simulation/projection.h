@@ -7,9 +7,9 @@
 #include <vector>
 
 namespace peat {
-/// The value of a field at a place from means over the cells around it: a linear function is fitted by least squares.
-/// Exact for linear fields wherever two layers of cells hold material, also on the edge of a body; where there is one
-/// layer only, or little more, it is constant across it.
+/// The value of a field at a place from means over the cells around it: a linear function is fitted by least
+/// squares. Exact for linear fields wherever two layers of cells hold material, also on the edge of a body;
+/// where there is one layer only, or little more, it is constant across it.
 ///
 /// Distances d are taken from the place in units of the cell size, per direction.
 template <int dim>
@@ -25,12 +25,13 @@ struct LinearFit
   /// Add sum w, sum w d, sum w d d to the moments of places.
   static void add(double w, const dealii::Tensor<1, dim> &d, double *moments);
 
-  /// c such that c[0] sum w f + c[1 + k] sum w d_k f is the value at the place; zeros if all weights are zero.
+  /// c such that c[0] sum w f + c[1 + k] sum w d_k f is the value at the place; zeros if all weights are
+  /// zero.
   static std::array<double, 1 + dim> coefficients(const double *moments);
 };
 
-/// Fields on the active nodes from means over cells, by linear fits through the cells around each node: second-order
-/// accurate also at the edges of bodies, and the same for any number of ranks.
+/// Fields on the active nodes from means over cells, by linear fits through the cells around each node:
+/// second-order accurate also at the edges of bodies, and the same for any number of ranks.
 template <int dim>
 class NodalProjection
 {

@@ -4,8 +4,8 @@
 #include <vector>
 
 namespace peat {
-/// Numbers under named columns, from a CSV file: lines that begin with # are skipped, the first other line holds the
-/// names. Entries may be empty.
+/// Numbers under named columns, from a CSV file: lines that begin with # are skipped, the first other line
+/// holds the names. Entries may be empty.
 class Table
 {
 public:
@@ -25,10 +25,10 @@ private:
 /// A name as an entry of a CSV file: in quotes if it holds a comma or a quote.
 std::string csv_entry(const std::string &text);
 
-/// A function through given points: in each interval the cubic polynomial through the four nearest points, i.e. of
-/// fourth order where the function is smooth, and what is not smooth disturbs the two neighbour intervals only. Linear
-/// in pieces of fewer than four points and in intervals much longer than a neighbour. Between two points of the same
-/// coordinate the function jumps.
+/// A function through given points: in each interval the cubic polynomial through the four nearest points,
+/// i.e. of fourth order where the function is smooth, and what is not smooth disturbs the two neighbour
+/// intervals only. Linear in pieces of fewer than four points and in intervals much longer than a neighbour.
+/// Between two points of the same coordinate the function jumps.
 class Curve
 {
 public:

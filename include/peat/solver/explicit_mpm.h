@@ -70,6 +70,7 @@ public:
 
 private:
   // The stages of a step, in the order of the equations.
+  void aggregate_small_nodes();
   void points_to_nodes();
   void add_loads();
   void solve_momentum();
@@ -81,7 +82,9 @@ private:
   void relocate_points();
 
   void resize_fields();
-  void advance_points_and_remap();
+  void renumber_kept_velocity();
+  void complete_kept_velocity();
+  double fastest_on_any_rank() const;
   dealii::Tensor<1, dim> total_momentum() const;
   const Surface<dim> &surface(const Condition<dim> &condition) const;
 
@@ -96,10 +99,15 @@ private:
   NodalFields<dim> nodal;
   /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
   std::vector<double> carrying_velocity;
+  /// What nodes keep of their velocity from step to step; empty if they keep nothing.
+  std::vector<double> kept_velocity;
+  std::vector<char> kept_is_known; ///< nodes that carried mass in the last step
   /// Nodes and components on impermeable faces of the mesh.
   std::vector<std::size_t> closed_rows;
   dealii::Tensor<1, dim> gravity_now;
 
+  /// Steps until the small nodes are looked for again; 0: at once.
+  unsigned int steps_to_aggregation = 0;
   double now;
   StepFindings findings;
   Ledger<dim> book;

@@ -19,15 +19,15 @@ struct SchemeParameters
     modified_last ///< MUSL: from the points' new velocities, mapped back to the nodes
   };
 
-  SchemeFields fields() const { return {affine, basis == Basis::gimp}; }
+  SchemeFields fields() const { return {basis == Basis::gimp}; }
   /// Share of the points' own velocity that survives a step of length dt.
   double retention(double dt) const;
 
   Basis basis;
   StressUpdate stress_update;
-  bool affine;                   ///< the points' velocity gradient takes part in the way to the nodes (TPIC, AFLIP)
-  bool grid_velocity;            ///< the points take the grid's velocity each step (PIC, TPIC)
-  double relaxation_time = 0.;   ///< of the points' velocity towards the grid's [s]; 0: never (FLIP, AFLIP)
+  bool nodes_keep_velocity;      ///< only the points' difference from the nodes' last velocity is mapped to the nodes
+  bool grid_velocity;            ///< the points take the grid's velocity each step (PIC)
+  double relaxation_time = 0.;   ///< of the points' velocity towards the grid's [s]; 0: never
   double local_damping = 0.;     ///< share of the out-of-balance force that opposes the velocity
   double pressure_filter = 0.;   ///< rate of the filter in units of c_u / h
   double step_factor = 0.8;      ///< step over stable step

@@ -44,8 +44,8 @@ struct PressureUpdate
   double filter = 0.;
 };
 
-/// The visits of the points of a body in a step, cell by cell. Members differ by basis, by whether there is pore fluid
-/// and by whether the transfer is affine; which one serves a body is decided once.
+/// The visits of the points of a body in a step, cell by cell. Members differ by basis, and by whether there is pore
+/// fluid; which one serves a body is decided once.
 ///
 /// Nodal arrays have one row per active node: `sums` with `stride` columns as in Sums, all others with dim columns.
 template <int dim>
@@ -54,10 +54,11 @@ class Kernels
 public:
   virtual ~Kernels() = default;
 
-  static std::unique_ptr<Kernels> make(Basis basis, bool saturated, bool affine);
+  static std::unique_ptr<Kernels> make(Basis basis, bool saturated);
 
-  /// Points to nodes: mass, momentum, internal force and, with pore fluid, the terms of Darcy's law.
-  virtual void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, double *sums,
+  /// Points to nodes: mass, momentum, internal force and, with pore fluid, the terms of Darcy's law. With a nodal
+  /// velocity `kept`, momentum is that of the difference v_p - kept(x_p) only.
+  virtual void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const double *kept, double *sums,
                        unsigned int stride) const = 0;
 
   /// Points' velocities from the nodes' acceleration `a` and new velocity `v` (modified-update-stress-last: and their
