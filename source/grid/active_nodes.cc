@@ -74,7 +74,7 @@ void ActiveNodes<dim>::number_nodes(const std::vector<CellId> &occupied_cells)
       table[s * n_cell_nodes + i] = add(background.node_at(lattice));
     }
   }
-  separate_table = table;
+  replaced.clear();
 }
 
 template <int dim>
@@ -110,10 +110,10 @@ unsigned int ActiveNodes<dim>::nearest_heavy_node(const std::array<double, 1 << 
 template <int dim>
 bool ActiveNodes<dim>::aggregate(const double *mass, const unsigned int stride, const double smallest_share)
 {
-  bool any = false;
+  separate();
   std::array<double, 1 << dim> own_mass;
   for (std::size_t s = 0; s < cells.size(); ++s) {
-    const std::uint32_t *own = &separate_table[s * n_cell_nodes];
+    std::uint32_t *own = &table[s * n_cell_nodes];
     double heaviest = 0.;
     for (unsigned int v = 0; v < own_mass.size(); ++v) {
       own_mass[v] = mass[std::size_t(own[own_node(v)]) * stride];
@@ -122,17 +122,19 @@ bool ActiveNodes<dim>::aggregate(const double *mass, const unsigned int stride, 
     const double least = smallest_share * heaviest;
     for (unsigned int i = 0; i < n_cell_nodes; ++i)
       if (mass[std::size_t(own[i]) * stride] < least) {
-        table[s * n_cell_nodes + i] = own[nearest_heavy_node(own_mass, i, least)];
-        any = true;
+        replaced.emplace_back(s * n_cell_nodes + i, own[i]);
+        own[i] = own[nearest_heavy_node(own_mass, i, least)];
       }
   }
-  return any;
+  return !replaced.empty();
 }
 
 template <int dim>
 void ActiveNodes<dim>::separate()
 {
-  table = separate_table;
+  for (const auto &[place, own_node] : replaced)
+    table[place] = own_node;
+  replaced.clear();
 }
 
 template <int dim>

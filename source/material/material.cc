@@ -22,4 +22,12 @@ Material::Material(Section section) : given_name(section.name())
                      "belongs to saturated materials; set 'Porosity' to make '" + given_name + "' one");
   }
 }
+double Material::initial_modulus() const
+{
+  std::vector<Lanes> state;
+  for (const StateField &field : skeleton->state())
+    for (const double value : field.initial)
+      state.push_back(broadcast(value));
+  return skeleton->wave_modulus({}, state.data())[0];
+}
 } // namespace peat

@@ -138,12 +138,7 @@ void Case<dim>::check(const Section &root) const
                                                 "' and has no pore pressure");
     if (!mixture || !scheme.seepage_inertia)
       continue;
-    const Law &law = material(body.material).law();
-    std::vector<Lanes> state;
-    for (const StateField &field : law.state())
-      for (const double value : field.initial)
-        state.push_back(broadcast(value));
-    const double M = law.wave_modulus({}, state.data())[0];
+    const double M = material(body.material).initial_modulus();
     if (mixture->well_posedness(M) <= 0.) {
       std::ostringstream message;
       const double r = mixture->r();

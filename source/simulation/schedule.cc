@@ -7,6 +7,7 @@ namespace peat {
 Schedule Schedule::every(const double interval, const double start, const double end)
 {
   Schedule schedule;
+  schedule.tolerance = 1e-12 * std::abs(end);
   if (interval > 0.) {
     const double n = std::ceil((end - start) / interval - 1e-9);
     for (double i = 1.; i < n; ++i)
@@ -20,18 +21,18 @@ Schedule Schedule::at(std::vector<double> times, const double start, const doubl
 {
   Schedule schedule;
   std::sort(times.begin(), times.end());
-  const double tolerance = 1e-12 * std::abs(end);
+  schedule.tolerance = 1e-12 * std::abs(end);
   for (const double time : times)
-    if (time > start + tolerance && time <= end + tolerance)
+    if (time > start + schedule.tolerance && time <= end + schedule.tolerance)
       schedule.times.push_back(std::min(time, end));
   return schedule;
 }
 
 bool Schedule::due(const double time)
 {
-  if (position >= times.size() || time < times[position])
-    return false;
-  ++position;
-  return true;
+  const std::size_t before = position;
+  while (position < times.size() && time >= times[position] - tolerance)
+    ++position;
+  return position > before;
 }
 } // namespace peat

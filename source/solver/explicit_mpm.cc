@@ -40,8 +40,14 @@ ExplicitMPM<dim>::ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &g
     : scheme(scheme), grid(grid), scene(scene), saturated(scene.is_saturated()), has_loads(!scene.surfaces.empty()),
       active(grid, static_cast<unsigned int>(scheme.basis)), now(start_time), book(carried)
 {
-  for (const auto &body : scene.bodies)
-    kernels.push_back(Kernels<dim>::make(scheme.basis, body->material().mixture() != nullptr));
+  for (const auto &body : scene.bodies) {
+    const Material &material = body->material();
+    kernels.push_back(Kernels<dim>::make(scheme.basis, material.mixture() != nullptr));
+    filter_rates.push_back(material.mixture() ? scheme.pressure_filter *
+                                                    material.mixture()->undrained_speed(material.initial_modulus()) /
+                                                    grid.smallest_cell_size()
+                                              : 0.);
+  }
   nodal.n_sums = saturated ? Sums<dim>::n_saturated : Sums<dim>::n_dry;
 }
 
@@ -194,8 +200,14 @@ void ExplicitMPM<dim>::points_to_nodes()
   std::fill(nodal.sums.begin(), nodal.sums.end(), 0.);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
     kernels[b]->scatter(*scene.bodies[b], active, scheme.nodes_keep_velocity ? kept_velocity.data() : nullptr,
-                        nodal.sums.data(), nodal.n_sums);
+                        pressure_update(b), nodal.sums.data(), nodal.n_sums);
   active.sum_over_ranks(nodal.sums.data(), nodal.n_sums);
+}
+
+template <int dim>
+PressureUpdate ExplicitMPM<dim>::pressure_update(const std::size_t body) const
+{
+  return {scheme.pressure_of_cells, 1. - std::exp(-filter_rates[body] * nodal.dt)};
 }
 
 template <int dim>
@@ -296,7 +308,6 @@ void ExplicitMPM<dim>::nodes_to_points()
 {
   findings = {};
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
-  const PressureUpdate pressure{1. - std::exp(-scheme.pressure_filter * nodal.dt)};
   const double *v = nodal.new_velocity.data(), *a = nodal.acceleration.data(), *w = nodal.flux.data();
   if (scheme.nodes_keep_velocity) {
     kept_velocity = nodal.new_velocity;
@@ -305,7 +316,7 @@ void ExplicitMPM<dim>::nodes_to_points()
   }
   if (scheme.stress_update == SchemeParameters::StressUpdate::last) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-      kernels[b]->advance_and_deform(*scene.bodies[b], active, a, v, w, update, pressure, findings);
+      kernels[b]->advance_and_deform(*scene.bodies[b], active, a, v, w, update, pressure_update(b), findings);
     return;
   }
   std::fill(carrying_velocity.begin(), carrying_velocity.end(), 0.);
@@ -320,7 +331,7 @@ void ExplicitMPM<dim>::nodes_to_points()
   for (const auto &condition : scene.conditions)
     condition->constrain_velocity(active, now + nodal.dt, nodal.dt, carrying_velocity);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    kernels[b]->deform(*scene.bodies[b], active, carrying_velocity.data(), w, nodal.dt, pressure, findings);
+    kernels[b]->deform(*scene.bodies[b], active, carrying_velocity.data(), w, nodal.dt, pressure_update(b), findings);
 }
 
 template <int dim>
@@ -341,6 +352,7 @@ void ExplicitMPM<dim>::book_balances()
       external += force * v;
       gravity += sum[S::mass] * gravity_now[d] * v;
       book.impulse[d] += nodal.dt * force;
+      book.gross_impulse += nodal.dt * std::abs(force);
       if (saturated) {
         dissipation += sum[S::resistance] * nodal.flux[row] * nodal.flux[row];
         seepage -= sum[S::pressure_force + d] * nodal.flux[row];

@@ -21,6 +21,11 @@ SchemeParameters::SchemeParameters(Section section)
               "does not depend on the step. 0: never.");
   section.add("Local damping", local_damping, between(0., 0.99),
               "Share of each node's out-of-balance force that acts against its velocity; for dynamic relaxation to rest.");
+  std::string pressure = "cell";
+  section.add("Pressure", pressure, {"cell", "point"},
+              "How pore pressure acts. 'cell': with its mean over the points of a cell, and following the mean rate there; "
+              "does not lock. 'point': each point on its own; locks in 2-D and 3-D with more than one point a cell.");
+  pressure_of_cells = pressure == "cell";
   section.add("Pressure filter", pressure_filter, nonnegative(""),
               "Rate, in units of c_u/h, at which pore pressures of points go to the mean of their cell; conserves the "
               "fluid's volume.");

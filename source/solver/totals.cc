@@ -78,7 +78,8 @@ template <int dim>
 void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MPI_Comm communicator)
 {
   std::vector<double> values = {ledger.external_work, ledger.gravity_work,  ledger.seepage_dissipation,
-                                ledger.seepage_work,  ledger.fluid_outflow, ledger.fluid_squeezed};
+                                ledger.seepage_work,  ledger.fluid_outflow, ledger.fluid_squeezed,
+                                ledger.gross_impulse};
   for (unsigned int d = 0; d < dim; ++d)
     values.push_back(ledger.impulse[d]);
   dealii::Utilities::MPI::sum(values, communicator, values);
@@ -88,18 +89,16 @@ void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MP
   book.seepage_work = values[3];
   book.fluid_outflow = values[4];
   book.fluid_squeezed = values[5];
-  double impulse = 0.;
-  for (unsigned int d = 0; d < dim; ++d) {
-    book.impulse[d] = values[6 + d];
-    impulse = std::max(impulse, std::abs(book.impulse[d]));
-  }
+  book.gross_impulse = values[6];
+  for (unsigned int d = 0; d < dim; ++d)
+    book.impulse[d] = values[7 + d];
 
   mass_error = std::max(mass_error, std::abs(now.mass - start.mass) / start.mass);
   if (start.fluid_volume > 0.)
     fluid_error = std::max(fluid_error, std::abs(now.fluid_volume - start.fluid_volume + book.fluid_outflow +
                                                  book.fluid_squeezed) /
                                             start.fluid_volume);
-  momentum_scale = std::max({momentum_scale, impulse, now.momentum.norm(), now.mass * now.largest_speed});
+  momentum_scale = std::max({momentum_scale, book.gross_impulse, start.momentum.norm(), now.mass * now.largest_speed});
   if (momentum_scale > 0.)
     momentum_error = std::max(momentum_error, (now.momentum - start.momentum - book.impulse).norm() / momentum_scale);
 

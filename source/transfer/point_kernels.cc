@@ -33,9 +33,22 @@ namespace {
 } // namespace
 
 template <int dim, unsigned int reach, bool saturated>
+double PointKernels<dim, reach, saturated>::mean_pressure(const Body<dim> &body, const Slice &slice)
+{
+  const Layout &layout = body.layout();
+  double sum = 0., volume = 0.;
+  for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
+    const double *row = body.row(body.handles()[i]);
+    sum += row[layout.volume] * row[layout.pressure];
+    volume += row[layout.volume];
+  }
+  return sum / volume;
+}
+
+template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes,
-                                                  const double *kept, double *sums,
-                                                  const unsigned int stride) const
+                                                  const double *kept, const PressureUpdate &pressure,
+                                                  double *sums, const unsigned int stride) const
 {
   using S = Sums<dim>;
   constexpr unsigned int n_sums = saturated ? S::n_saturated : S::n_dry;
@@ -56,6 +69,7 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
     if (kept)
       gather(kept, cell_nodes, local_kept);
     alignas(64) NodeLanes local[n_sums][Chunks::n] = {};
+    const double mean_p = saturated && pressure.cell_means ? mean_pressure(body, slice) : 0.;
 
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       collect(body, slice, begin, batch);
@@ -72,7 +86,7 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
       Lanes alpha_p = broadcast(0.);
       if constexpr (saturated) {
         const FluidLanes f = fluid(*mixture, layout, batch, at_start);
-        const Lanes p = batch.load(layout.pressure);
+        const Lanes p = pressure.cell_means ? broadcast(mean_p) : batch.load(layout.pressure);
         alpha_p = mixture->biot_coefficient() * p;
         reinterpret_cast<Lanes &>(darcy[0]) = V / f.kappa;
         reinterpret_cast<Lanes &>(darcy[1]) = V * mixture->fluid_density();
@@ -181,10 +195,52 @@ void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, con
 }
 
 template <int dim, unsigned int reach, bool saturated>
+template <typename Row>
+Lanes PointKernels<dim, reach, saturated>::volumes(const Layout &layout, const Batch<Row> &batch)
+{
+  Lanes V = batch.load(layout.volume);
+  for (unsigned int l = batch.n; l < n_lanes; ++l)
+    V[l] = 0.;
+  return V;
+}
+
+template <int dim, unsigned int reach, bool saturated>
+Lanes PointKernels<dim, reach, saturated>::divergence_of(const Weights<dim, reach> &weights,
+                                                           const double (*w)[Chunks::n_nodes])
+{
+  Lanes divergence = broadcast(0.);
+  for (unsigned int d = 0; d < dim; ++d)
+    divergence += derivative<dim, reach>(w[d], weights, d);
+  return divergence;
+}
+
+template <int dim, unsigned int reach, bool saturated>
+typename PointKernels<dim, reach, saturated>::Divergences
+PointKernels<dim, reach, saturated>::mean_divergences(const Body<dim> &body, const Slice &slice,
+                                                      const std::array<CellInterval, dim> &cell,
+                                                      const double (*v)[Chunks::n_nodes],
+                                                      const double (*w)[Chunks::n_nodes])
+{
+  Batch<const double> batch;
+  std::array<Lanes, dim> x;
+  Weights<dim, reach> weights;
+  double sum_v = 0., sum_w = 0., volume = 0.;
+  for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
+    collect(body, slice, begin, batch);
+    evaluate(body, batch, cell, x, weights);
+    const Lanes V = volumes(body.layout(), batch);
+    sum_v += sum(V * divergence_of(weights, v));
+    sum_w += sum(V * divergence_of(weights, w));
+    volume += sum(V);
+  }
+  return {broadcast(sum_v / volume), broadcast(sum_w / volume)};
+}
+
+template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::deform_batch(
     Body<dim> &body, const Batch<double> &batch, const std::array<CellInterval, dim> &cell,
     const std::array<Lanes, dim> &x, const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
-    const double (*w)[Chunks::n_nodes], const double dt, StepFindings &findings)
+    const double (*w)[Chunks::n_nodes], const double dt, const Divergences *cell_mean, StepFindings &findings)
 {
   const Layout &layout = body.layout();
   const Law &law = body.material().law();
@@ -217,21 +273,17 @@ void PointKernels<dim, reach, saturated>::deform_batch(
 
   if constexpr (saturated) {
     const Mixture &mixture = *body.material().mixture();
-    Lanes outflow = broadcast(0.);
-    for (unsigned int d = 0; d < dim; ++d)
-      outflow += derivative<dim, reach>(w[d], weights, d);
+    const Divergences div = cell_mean ? *cell_mean : Divergences{divergence, divergence_of(weights, w)};
     const Lanes Q = layout.porosity < 0 ? broadcast(mixture.Q()) : 1. / mixture.storage(batch.load(layout.porosity));
     const Lanes p =
-        batch.load(layout.pressure) - dt * Q * (outflow + mixture.biot_coefficient() * divergence);
+        batch.load(layout.pressure) - dt * Q * (div.w + mixture.biot_coefficient() * div.v);
     batch.store(layout.pressure, p);
     check += p;
 
-    Lanes V = batch.load(layout.volume);
-    for (unsigned int l = batch.n; l < n_lanes; ++l)
-      V[l] = 0.;
-    findings.fluid_outflow += dt * sum(V * outflow);
+    const Lanes V = volumes(layout, batch);
+    findings.fluid_outflow += dt * sum(V * div.w);
     if (layout.porosity < 0)
-      findings.fluid_squeezed += dt * mixture.biot_coefficient() * sum(V * divergence);
+      findings.fluid_squeezed += dt * mixture.biot_coefficient() * sum(V * div.v);
   }
 
   if (law.finite_strain()) {
@@ -307,12 +359,17 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(v, cell_nodes, local_v);
-    if constexpr (saturated)
+    const bool averaged = saturated && pressure.cell_means;
+    Divergences mean{};
+    if constexpr (saturated) {
       gather(w, cell_nodes, local_w);
+      if (averaged)
+        mean = mean_divergences(body, slice, cell, local_v, local_w);
+    }
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, weights);
-      deform_batch(body, batch, cell, x, weights, local_v, local_w, dt, findings);
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, dt, averaged ? &mean : nullptr, findings);
     }
     if (saturated && pressure.filter > 0.)
       filter_pressure(body, slice, pressure.filter);
@@ -333,13 +390,18 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(a, cell_nodes, local_a);
     gather(v, cell_nodes, local_v);
-    if constexpr (saturated)
+    const bool averaged = saturated && pressure.cell_means;
+    Divergences mean{};
+    if constexpr (saturated) {
       gather(w, cell_nodes, local_w);
+      if (averaged)
+        mean = mean_divergences(body, slice, cell, local_v, local_w);
+    }
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, weights);
       advance(body, batch, weights, local_a, local_v, update, velocity);
-      deform_batch(body, batch, cell, x, weights, local_v, local_w, update.dt, findings);
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, update.dt, averaged ? &mean : nullptr, findings);
     }
     if (saturated && pressure.filter > 0.)
       filter_pressure(body, slice, pressure.filter);

@@ -10,8 +10,8 @@ template <int dim, unsigned int reach, bool saturated>
 class PointKernels : public Kernels<dim>
 {
 public:
-  void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const double *kept, double *sums,
-               const unsigned int stride) const override;
+  void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const double *kept,
+               const PressureUpdate &pressure, double *sums, const unsigned int stride) const override;
   void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
                          const VelocityUpdate &update, double *momentum) const override;
   void deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *v, const double *w, const double dt,
@@ -90,10 +90,27 @@ private:
                       const double (*a)[Chunks::n_nodes], const double (*v)[Chunks::n_nodes],
                       const VelocityUpdate &update, std::array<Lanes, dim> &new_velocity);
 
+  /// div v and div w of a batch.
+  struct Divergences
+  {
+    Lanes v;
+    Lanes w;
+  };
+
   static void deform_batch(Body<dim> &body, const Batch<double> &batch, const std::array<CellInterval, dim> &cell,
                            const std::array<Lanes, dim> &x, const Weights<dim, reach> &weights,
                            const double (*v)[Chunks::n_nodes], const double (*w)[Chunks::n_nodes], const double dt,
-                           StepFindings &findings);
+                           const Divergences *cell_mean, StepFindings &findings);
+
+  /// Volume-weighted means over the points of a cell, the same in all lanes.
+  static Divergences mean_divergences(const Body<dim> &body, const Slice &slice,
+                                      const std::array<CellInterval, dim> &cell, const double (*v)[Chunks::n_nodes],
+                                      const double (*w)[Chunks::n_nodes]);
+  /// Zero in lanes without a point.
+  template <typename Row>
+  static Lanes volumes(const Layout &layout, const Batch<Row> &batch);
+  static Lanes divergence_of(const Weights<dim, reach> &weights, const double (*field)[Chunks::n_nodes]);
+  static double mean_pressure(const Body<dim> &body, const Slice &slice);
 
   static void filter_pressure(Body<dim> &body, const Slice &slice, const double share);
 };

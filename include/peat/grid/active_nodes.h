@@ -82,7 +82,8 @@ private:
   std::vector<CellId> cells;
   std::vector<std::uint32_t> slot;
   std::vector<std::uint32_t> table;
-  std::vector<std::uint32_t> separate_table;
+  /// What aggregation has replaced in the table: place and own node.
+  std::vector<std::pair<std::size_t, std::uint32_t>> replaced;
   std::vector<NodeId> node;
   std::vector<std::uint32_t> active_index; ///< by NodeId
   std::vector<std::uint32_t> old_index;    ///< by NodeId

@@ -21,6 +21,8 @@ public:
   const Law &law() const { return *skeleton; }
   /// nullptr for a dry material.
   const Mixture *mixture() const { return pores.get(); }
+  /// Stiffness of the skeleton to a plane compression wave at the start, without stress [Pa].
+  double initial_modulus() const;
   /// Mass per volume at the start, of the mixture if saturated [kg/m^3].
   double density() const { return pores ? pores->density() : dry_density; }
 

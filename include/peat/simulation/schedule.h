@@ -16,11 +16,12 @@ public:
 
   /// The next time that is due; infinity when none is left.
   double next() const { return position < times.size() ? times[position] : std::numeric_limits<double>::infinity(); }
-  /// Whether something is due at this time; if so it is ticked off.
+  /// Whether something is due at this time, up to the round-off of sums of steps; if so it is ticked off.
   bool due(double time);
 
 private:
   std::vector<double> times;
+  double tolerance = 0.;
   std::size_t position = 0;
 };
 } // namespace peat

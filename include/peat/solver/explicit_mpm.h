@@ -26,6 +26,7 @@ struct Ledger
   double fluid_outflow = 0.;       ///< of pore fluid through the boundaries [m^dim]
   double fluid_squeezed = 0.;      ///< pore volume lost by compression that V n does not show (small strain) [m^dim]
   dealii::Tensor<1, dim> impulse;  ///< of all external forces [N s]
+  double gross_impulse = 0.;       ///< integral of the sum of the external forces' magnitudes on nodes [N s]
 };
 
 /// The bodies, the conditions on them and the tracers that move with them: what a stage of a run works on.
@@ -86,6 +87,7 @@ private:
   void complete_kept_velocity();
   double fastest_on_any_rank() const;
   dealii::Tensor<1, dim> total_momentum() const;
+  PressureUpdate pressure_update(std::size_t body) const;
   const Surface<dim> &surface(const Condition<dim> &condition) const;
 
   const SchemeParameters &scheme;
@@ -96,6 +98,7 @@ private:
 
   ActiveNodes<dim> active;
   std::vector<std::unique_ptr<Kernels<dim>>> kernels;
+  std::vector<double> filter_rates; ///< of the pressure filter, by body [1/s]
   NodalFields<dim> nodal;
   /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
   std::vector<double> carrying_velocity;

@@ -29,6 +29,7 @@ struct SchemeParameters
   bool grid_velocity;            ///< the points take the grid's velocity each step (PIC)
   double relaxation_time = 0.;   ///< of the points' velocity towards the grid's [s]; 0: never
   double local_damping = 0.;     ///< share of the out-of-balance force that opposes the velocity
+  bool pressure_of_cells = true; ///< pore pressure acts with its mean over the points of a cell
   double pressure_filter = 0.;   ///< rate of the filter in units of c_u / h
   double step_factor = 0.8;      ///< step over stable step
   double fixed_step = 0.;        ///< [s]; 0: automatic

@@ -40,6 +40,10 @@ struct VelocityUpdate
 /// How a step treats the pore pressure.
 struct PressureUpdate
 {
+  /// Pore pressure acts with its mean over the points of a cell, and follows the means of div v and div w: one value a
+  /// cell, as in the element Q1-P0, where one value a point would lock. Each point still has its own pressure, which
+  /// moves with it.
+  bool cell_means = true;
   /// Share by which each point's pressure goes towards the mean of its cell in this step; conserves sum V p / Q.
   double filter = 0.;
 };
@@ -58,8 +62,8 @@ public:
 
   /// Points to nodes: mass, momentum, internal force and, with pore fluid, the terms of Darcy's law. With a nodal
   /// velocity `kept`, momentum is that of the difference v_p - kept(x_p) only.
-  virtual void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const double *kept, double *sums,
-                       unsigned int stride) const = 0;
+  virtual void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const double *kept,
+                       const PressureUpdate &pressure, double *sums, unsigned int stride) const = 0;
 
   /// Points' velocities from the nodes' acceleration `a` and new velocity `v` (modified-update-stress-last: and their
   /// momentum back to the nodes, columns of `momentum`).
