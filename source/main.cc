@@ -32,13 +32,14 @@ bool parse(const int argc, char **argv, const bool first_rank, CommandLine &line
 {
   std::vector<std::string> words;
   options::options_description visible("Options");
-  visible.add_options()("set", options::value(&line.run.overrides)->composing()->value_name("\"Section/Key=value\""),
+  visible.add_options()("set",
+                        options::value(&line.run.overrides)->composing()->value_name("\"Section/Key=value\""),
                         "override an entry of the file; repeatable")(
       "output", options::value(&line.run.output)->value_name("DIR"), "directory for results (output/CASE)")(
       "quiet", options::bool_switch(&line.run.quiet), "say nothing on the terminal but errors")(
-      "format", options::value(&line.format)->value_name("prm|markdown|json"), "of 'peat parameters'")(
-      "dimension", options::value(&line.dimension)->value_name("2|3"), "of 'peat parameters'")(
-      "help", "this text")("version", "the version");
+      "format", options::value(&line.format)->value_name("prm|markdown|json"),
+      "of 'peat parameters'")("dimension", options::value(&line.dimension)->value_name("2|3"),
+                              "of 'peat parameters'")("help", "this text")("version", "the version");
   options::options_description all;
   all.add(visible).add_options()("words", options::value(&words));
   options::positional_options_description positions;
@@ -62,6 +63,8 @@ bool parse(const int argc, char **argv, const bool first_rank, CommandLine &line
     return true;
   }
 
+  if (values.count("output") && line.run.output.empty())
+    throw InputError("'--output' needs the name of a directory");
   const std::string &first = words.front();
   const bool is_command = first == "run" || first == "check" || first == "parameters";
   line.command = is_command ? first : "run";
@@ -78,8 +81,9 @@ bool parse(const int argc, char **argv, const bool first_rank, CommandLine &line
     return false;
   }
   if (words.size() != n_words)
-    throw InputError(words.size() < n_words ? "'peat " + line.command + "' needs a parameter file"
-                                            : "one parameter file at a time, please; got also '" + words[n_words] + "'");
+    throw InputError(words.size() < n_words
+                         ? "'peat " + line.command + "' needs a parameter file"
+                         : "one parameter file at a time, please; got also '" + words[n_words] + "'");
   line.run.file = words.back();
   return false;
 }
@@ -100,7 +104,8 @@ int main(int argc, char **argv)
       return exit_success;
     if (line.command == "parameters")
       return first_rank ? command_parameters(line.format, line.dimension) : exit_success;
-    return line.command == "check" ? command_check(line.run, communicator) : command_run(line.run, communicator);
+    return line.command == "check" ? command_check(line.run, communicator)
+                                   : command_run(line.run, communicator);
   } catch (const InputError &error) {
     if (first_rank)
       complain(error.what());

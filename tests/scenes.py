@@ -304,8 +304,11 @@ def s3(c):
     times = crossings(t, u, static)
     c.below("period", abs((times[-1] - times[0]) / (0.5 * (len(times) - 1)) / T - 1.), 3e-3)
     c.below("stress at the base, Linf", run.error("stress at the base", "Linf"), 3e-2)
-    run = c.run("S3_gravity_step", {"Stages/fall/Local damping": 0.5, "Constants/g": 9.81e-6, "Constants/End": "100*H/c"})
-    c.below("static displacement", abs(run.table("probes.csv")["top/displacement y"][-1] / (static * 1e-6) - 1.), 1e-6)
+    run = c.run("S3_gravity_step", {"Stages/fall/Local damping": 0.5, "Constants/g": 9.81e-3, "Constants/End": "200*H/c"})
+    p = run.table("probes.csv")
+    # Places are known to 1e-15 of 10 m, the displacement is 1e-6 m and made of ten thousand steps.
+    c.below("static displacement", abs(p["top/displacement y"][-1] / (static * 1e-3) - 1.), 3e-6)
+    c.below("static stress at the base", abs(p["base/effective stress yy"][-1] / (-rho * g * H * 1e-3) - 1.), 1e-6)
 
 
 def s4_errors(run, law):
@@ -349,13 +352,18 @@ def s5_patch(c):
     for shift in (0, 0.37):
         run = c.run("S5_patch", dict(everywhere, **{"Constants/shift": shift}))
         c.below("all nodes prescribed, shift %g" % shift, largest(run, components), 1e-12)
-    for shift in (0, 0.37):
-        # The points move by 1e-10 of the body: that much the weights change.
+        # The points move by 1e-10 of the body: about that much the weights change.
         run = c.run("S5_patch", {"Constants/shift": shift})
-        c.below("rim prescribed, shift %g" % shift, largest(run, components), 1e-9)
-        run = c.run("S5_pressed_patch", {"Constants/shift": shift})
-        c.below("at rest under tractions, shift %g: velocity" % shift, run.error("velocity", "Linf"), 1e-12)
-        c.below("at rest under tractions, shift %g: stress" % shift, largest(run, ("stress yy", "stress xy")), 1e-12)
+        c.below("rim prescribed, shift %g" % shift, largest(run, components), 1e-8)
+    for sx, sy in ((0, 0), (0.37, 0), (0, 0.6), (0.37, 0.37), (0.6, 0.6)):
+        run = c.run("S5_pressed_patch", {"Constants/sx": sx, "Constants/sy": sy}, may_fail=True)
+        name = "at rest under tractions, shift (%g, %g)" % (sx, sy)
+        if not run.completed:
+            c.note(name, False, run.message)
+            continue
+        # The tractions act 1e-7 of a piece of the surface inside the body.
+        c.below(name + ": velocity", run.error("velocity", "Linf"), 1e-6)
+        c.below(name + ": stress", largest(run, ("stress yy", "stress xy")), 1e-6)
 
 
 def s5_rigid_motion(c):
@@ -438,8 +446,20 @@ def p2(c, sizes=(10, 20, 40)):
     c.below("displacement, Linf", runs[-1].error("displacement", "Linf"), 5e-3)
     c.order("pressure", sizes, [run.error("pressure", "L2") for run in runs], 1.8)
     run = c.run("P2_selfweight_consolidation", {
-        "Constants/H": 1, "Constants/cells": 10, "Constants/K_f": 2.2e7, "Constants/g": 1e-3, "Constants/End": "7*t_1"})
+        "Constants/H": 1, "Constants/cells": 10, "Constants/K_f": 2.2e8, "Constants/g": 1e-3, "Constants/End": "7*t_1"})
     c.below("pressure in the end, hydrostatic", run.error("hydrostatic", "Linf"), 1e-6)
+
+
+def p2_soft(c):
+    """With a fluid only four times as stiff as the form needs, rest must stay rest for a long time, too."""
+    for cells in (10, 11):
+        run = c.run("P2_selfweight_consolidation", {
+            "Constants/H": 1, "Constants/cells": cells, "Constants/K_f": 2.2e7, "Constants/g": 1e-3,
+            "Constants/End": "7*t_1"}, may_fail=True)
+        c.note("%d cells, completes" % cells, run.completed, run.message)
+        if run.completed:
+            # The largest speed while the column settles is 1e-8 m/s.
+            c.below("%d cells, speed in the end" % cells, run.table("statistics.csv")["largest speed"][-1], 1e-10)
 
 
 # ---------------------------------------------------------------------------------------------------------- dynamics
@@ -491,20 +511,22 @@ def d5_eigenvalues(form):
 
 def d5(c, sizes=(10, 20, 40)):
     for form in ("up", "up0"):
-        exact, found = d5_eigenvalues(form), []
-        for n in sizes:
-            settings = {"Constants/cells": n, "Seepage inertia": "true" if form == "up" else "false"}
+        exact, errors = d5_eigenvalues(form), {}
+        # The errors of space and time have opposite signs: the order is that of space, at a small step.
+        for n, factor in [(20, 0.5)] + [(n, 0.1) for n in sizes]:
+            settings = {"Constants/cells": n, "Explicit MPM/Step factor": factor,
+                        "Seepage inertia": "true" if form == "up" else "false"}
             for name, column in (("velocity in the middle", "V_%s [m/s]"), ("pressure at the base", "P_%s [Pa]")):
                 settings["References/%s/Columns" % name] = column % form
             run = c.run("D5_standing_wave", settings)
             p = run.table("probes.csv")
-            found.append(fit_decay(p["time"], p["middle/velocity y"], exact))
-        errors = [[abs(a / b - 1.) for a, b in zip(values, exact)] for values in found]
-        c.below(form + ": imaginary part at 40 cells a wave length", errors[1][1], 2e-3)
-        c.below(form + ": real part", errors[1][0], 2e-2)
-        c.below(form + ": slow decay", errors[1][2], 2e-2)
+            found = fit_decay(p["time"], p["middle/velocity y"], exact)
+            errors[n, factor] = [abs(a / b - 1.) for a, b in zip(found, exact)]
+        c.below(form + ": imaginary part at 40 cells a wave length", errors[20, 0.5][1], 2e-3)
+        c.below(form + ": real part", errors[20, 0.5][0], 2e-2)
+        c.below(form + ": slow decay", errors[20, 0.5][2], 2e-2)
         for k, part in ((1, "imaginary part"), (0, "real part")):
-            c.order("%s: %s" % (form, part), sizes, [e[k] for e in errors], 1.8)
+            c.order("%s: %s" % (form, part), sizes, [errors[n, 0.1][k] for n in sizes], 1.8)
 
 
 def g1(c):
@@ -527,7 +549,7 @@ def n1_limit(c, k, formula):
     low, high = 0.6, 2.4
     if not stable(low):
         return 0.
-    while high / low > 1.02:
+    while high / low > 1.03:
         middle = math.sqrt(low * high)
         low, high = (middle, high) if stable(middle) else (low, middle)
     return math.sqrt(low * high) * formula
@@ -610,6 +632,7 @@ CASES = {
     "P1_fine": (lambda c: p1(c, sizes=(20, 40, 80)), ("full",), 60),
     "P1_3d": (p1_3d, ("full",), 10),
     "P2": (p2, ("quick", "full"), 4),
+    "P2_soft_fluid": (p2_soft, ("full",), 2),
     "D2": (d2, ("quick", "full"), 2),
     "D3": (d3, ("quick", "full"), 2),
     "D3_fine": (lambda c: d3(c, sizes=(40, 80, 160)), ("full",), 15),

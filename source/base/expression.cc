@@ -8,6 +8,7 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <set>
 
 namespace peat {
 namespace {
@@ -185,6 +186,7 @@ struct Function::Implementation
   std::vector<Component> components;
   bool is_constant = true;
   bool is_uniform = true;
+  std::set<std::string> used;
   /// x, y, z, t, where the parsers look for them.
   double variables[4] = {0., 0., 0., 0.};
 };
@@ -199,14 +201,16 @@ Function::Implementation::Implementation(const std::string &text, const Constant
   for (const std::string &part : parts) {
     Component component;
     component.parser = compile(part, constants, variables, origin);
-    const auto used = component.parser->GetUsedVar();
-    if (used.empty()) {
+    const auto variables_used = component.parser->GetUsedVar();
+    if (variables_used.empty()) {
       component.value = finite(component.parser->Eval(), part, origin);
       component.parser.reset();
     } else {
       is_constant = false;
-      if (used.size() > 1 || used.begin()->first != "t")
+      if (variables_used.size() > 1 || variables_used.begin()->first != "t")
         is_uniform = false;
+      for (const auto &variable : variables_used)
+        used.insert(variable.first);
     }
     components.push_back(std::move(component));
   }
@@ -251,6 +255,11 @@ bool Function::is_constant() const
 bool Function::is_uniform() const
 {
   return implementation->is_uniform;
+}
+
+bool Function::depends_on(const std::string &variable) const
+{
+  return implementation->used.count(variable) > 0;
 }
 
 double Function::value(const double *x, const double t, const unsigned int component) const

@@ -71,6 +71,8 @@ public:
   SectionNode root;
   Constants constants;
   bool describing = false;
+  /// 2 or 3 once it is known.
+  unsigned int dimension = 0;
 
 private:
   void evaluate_constants();

@@ -233,6 +233,8 @@ void Section::add(const std::string &key, Function &value, const unsigned int n_
       fail(key, std::to_string(n_components) + (n_components == 1 ? " component is" : " components are") +
                     " needed, but " + in_quotes(given->value) + " has " +
                     std::to_string(value.n_components()));
+    if (tree->dimension == 2 && value.depends_on("z"))
+      fail(key, "there is no z in 2-D; the vertical axis is y");
     entry.value = value.text();
   }
 }
@@ -309,6 +311,39 @@ void Section::fail(const std::string &key, const std::string &message) const
     place += (place.empty() ? "" : "/") + key;
   place = shortened(place, 200);
   throw InputError(origin(key), (place.empty() ? "" : place + ": ") + message);
+}
+
+void Section::require(const std::string &key, const std::string &owner) const
+{
+  if (describing() || has(key))
+    return;
+  std::vector<std::string> unknown;
+  if (node->in_file != nullptr)
+    for (const PrmEntry &entry : node->in_file->entries)
+      if (std::none_of(node->declared.begin(), node->declared.end(),
+                       [&](const Declared &one) { return one.key == entry.key; }))
+        unknown.push_back(entry.key);
+  const std::string misspelt = nearest(key, unknown);
+  fail(misspelt, owner + " needs a " + in_quotes(key) +
+                     (misspelt.empty() ? "" : "; is that what " + in_quotes(misspelt) + " stands for?"));
+}
+
+void Section::require_start(const std::string &key, const Function &value) const
+{
+  if (!value.is_uniform())
+    return;
+  const double place[3] = {0., 0., 0.};
+  try {
+    for (unsigned int c = 0; c < value.n_components(); ++c)
+      value.value(place, 0., c);
+  } catch (const NumericalError &) {
+    fail(key, in_quotes(value.text()) + " is not finite at the start, t = 0");
+  }
+}
+
+void Section::set_dimension(const unsigned int dim)
+{
+  tree->dimension = dim;
 }
 
 const Constants &Section::constants() const

@@ -1,29 +1,31 @@
 #include <peat/condition/condition.h>
 
+#include <algorithm>
+
 namespace peat {
 namespace {
-  template <int dim>
-  int boundary_id(const std::string &name)
-  {
-    const auto &names = boundary_names<dim>();
-    for (unsigned int b = 0; b < names.size(); ++b)
-      if (names[b] == name)
-        return b;
-    return -1;
-  }
+template <int dim>
+int boundary_id(const std::string &name)
+{
+  const auto &names = boundary_names<dim>();
+  for (unsigned int b = 0; b < names.size(); ++b)
+    if (names[b] == name)
+      return b;
+  return -1;
+}
 
-  std::string quoted_list(const std::vector<std::string> &words)
-  {
-    std::string text;
-    for (const auto &word : words)
-      text += (text.empty() ? "'" : ", '") + word + "'";
-    return text;
-  }
+std::string quoted_list(const std::vector<std::string> &words)
+{
+  std::string text;
+  for (const auto &word : words)
+    text += (text.empty() ? "'" : ", '") + word + "'";
+  return text;
+}
 
-  bool contains(const std::vector<std::string> &words, const std::string &word)
-  {
-    return std::find(words.begin(), words.end(), word) != words.end();
-  }
+bool contains(const std::vector<std::string> &words, const std::string &word)
+{
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
 } // namespace
 
 template <int dim>
@@ -34,16 +36,20 @@ Place<dim>::Place(Section section, const std::vector<std::string> &body_names)
   section.add("Where", where,
               "Faces of the mesh (" + quoted_list(boundary_names<dim>()) +
                   "), 'surface of BODY', one side of a body ('top of BODY'), or 'region'.");
-  section.add("Region", region_text, "A shape: only nodes (or parts of the surface, as they were at the start) inside "
-                                     "it are meant. Empty: no restriction.");
+  section.add("Region", region_text,
+              "A shape: only nodes (or parts of the surface, as they were at the start) inside "
+              "it are meant. Empty: no restriction.");
   if (!region_text.empty())
     region = parse_shape<dim>(region_text, section.constants(), section.origin("Region"));
   if (section.describing())
     return;
+  section.require("Where", "condition '" + section.name() + "'");
   if (where.empty())
-    section.fail("Where", "condition '" + section.name() + "' needs 'Where'");
+    section.fail("Where", "name faces of the mesh, the surface of a body, or 'region'");
 
   for (const std::string &word : where) {
+    if (std::count(where.begin(), where.end(), word) > 1)
+      section.fail("Where", "'" + word + "' stands twice");
     const std::size_t of = word.find(" of ");
     if (of != std::string::npos) {
       if (where.size() > 1)
@@ -57,14 +63,17 @@ Place<dim>::Place(Section section, const std::vector<std::string> &body_names)
       if (!peat::contains(body_names, body))
         section.fail("Where", "there is no body '" + body + "'; the bodies are " + quoted_list(body_names));
     } else if (word == "region") {
+      if (where.size() > 1)
+        section.fail(
+            "Where",
+            "'region' stands alone; with faces of the mesh 'Region' says which part of them is meant");
       if (!region)
         section.fail("Where", "'Where = region' needs a 'Region'");
     } else {
       const int id = boundary_id<dim>(word);
       if (id < 0)
         section.fail("Where", "there is no boundary '" + word + "'; the mesh has " +
-                                  quoted_list(boundary_names<dim>()) +
-                                  ", bodies have 'surface of BODY'");
+                                  quoted_list(boundary_names<dim>()) + ", bodies have 'surface of BODY'");
       boundaries.push_back(id);
     }
   }
@@ -90,9 +99,9 @@ void Condition<dim>::select(const ActiveNodes<dim> &nodes)
   selections.clear();
   if (!place.on_mesh())
     return;
-  const double tolerance = 1e-9 * nodes.grid().smallest_cell_size();
+  const double tolerance = Place<dim>::tolerance(nodes.grid());
   const auto in_region = [&](const std::uint32_t i) {
-    return !place.region || place.region->distance(nodes.position(i)) <= tolerance;
+    return place.contains_node(nodes.position(i), tolerance);
   };
   for (const unsigned int boundary : place.boundaries) {
     selections.push_back({int(boundary), {}});
@@ -126,8 +135,7 @@ std::unique_ptr<Condition<dim>> make_condition(Section section, const std::vecto
   }
   std::string kind = "fixed";
   section.add("Kind", kind, kinds, text);
-  if (!section.describing() && !section.has("Kind"))
-    section.fail("Kind", "condition '" + section.name() + "' needs a 'Kind'");
+  section.require("Kind", "condition '" + section.name() + "'");
   const Place<dim> place(section, body_names);
   if (section.describing())
     for (const auto &[name, entry] : condition_family<dim>())

@@ -8,8 +8,8 @@ ActiveNodes<dim>::ActiveNodes(const Grid<dim> &grid, const unsigned int nodes_pe
     : background(grid), reach(nodes_per_direction),
       n_cell_nodes(dim == 2 ? nodes_per_direction * nodes_per_direction
                             : nodes_per_direction * nodes_per_direction * nodes_per_direction),
-      slot(grid.n_local_cells(), no_index), active_index(grid.locally_relevant_nodes().n_elements(), no_index),
-      old_index(active_index)
+      slot(grid.n_local_cells(), no_index),
+      active_index(grid.locally_relevant_nodes().n_elements(), no_index), old_index(active_index)
 {}
 
 template <int dim>
@@ -74,7 +74,6 @@ void ActiveNodes<dim>::number_nodes(const std::vector<CellId> &occupied_cells)
       table[s * n_cell_nodes + i] = add(background.node_at(lattice));
     }
   }
-  replaced.clear();
 }
 
 template <int dim>
@@ -84,57 +83,6 @@ unsigned int ActiveNodes<dim>::own_node(const unsigned int vertex) const
   for (int d = dim - 1; d >= 0; --d)
     local = local * reach + ((vertex >> d) & 1) + (reach == 4 ? 1 : 0);
   return local;
-}
-
-template <int dim>
-unsigned int ActiveNodes<dim>::nearest_heavy_node(const std::array<double, 1 << dim> &own_mass,
-                                                  const unsigned int local, const double least_mass) const
-{
-  unsigned int best = 0;
-  int best_distance = std::numeric_limits<int>::max();
-  for (unsigned int v = 0; v < (1u << dim); ++v) {
-    if (own_mass[v] < least_mass)
-      continue;
-    int distance = 0;
-    const unsigned int candidate = own_node(v);
-    for (unsigned int d = 0, a = local, b = candidate; d < dim; ++d, a /= reach, b /= reach)
-      distance += std::abs(int(a % reach) - int(b % reach));
-    if (distance < best_distance || (distance == best_distance && own_mass[v] > own_mass[best])) {
-      best = v;
-      best_distance = distance;
-    }
-  }
-  return own_node(best);
-}
-
-template <int dim>
-bool ActiveNodes<dim>::aggregate(const double *mass, const unsigned int stride, const double smallest_share)
-{
-  separate();
-  std::array<double, 1 << dim> own_mass;
-  for (std::size_t s = 0; s < cells.size(); ++s) {
-    std::uint32_t *own = &table[s * n_cell_nodes];
-    double heaviest = 0.;
-    for (unsigned int v = 0; v < own_mass.size(); ++v) {
-      own_mass[v] = mass[std::size_t(own[own_node(v)]) * stride];
-      heaviest = std::max(heaviest, own_mass[v]);
-    }
-    const double least = smallest_share * heaviest;
-    for (unsigned int i = 0; i < n_cell_nodes; ++i)
-      if (mass[std::size_t(own[i]) * stride] < least) {
-        replaced.emplace_back(s * n_cell_nodes + i, own[i]);
-        own[i] = own[nearest_heavy_node(own_mass, i, least)];
-      }
-  }
-  return !replaced.empty();
-}
-
-template <int dim>
-void ActiveNodes<dim>::separate()
-{
-  for (const auto &[place, own_node] : replaced)
-    table[place] = own_node;
-  replaced.clear();
 }
 
 template <int dim>
@@ -171,6 +119,20 @@ void ActiveNodes<dim>::make_exchange()
 template <int dim>
 void ActiveNodes<dim>::sum_over_ranks(double *data, const unsigned int n_components) const
 {
+  combine_over_ranks(data, n_components, [](const double a, const double b) { return a + b; });
+}
+
+template <int dim>
+void ActiveNodes<dim>::max_over_ranks(double *data, const unsigned int n_components) const
+{
+  combine_over_ranks(data, n_components, [](const double a, const double b) { return std::max(a, b); });
+}
+
+template <int dim>
+template <typename Combine>
+void ActiveNodes<dim>::combine_over_ranks(double *data, const unsigned int n_components,
+                                          const Combine &combine) const
+{
   if (to_owners.empty() && from_others.empty())
     return;
   const MPI_Comm communicator = background.communicator();
@@ -199,12 +161,13 @@ void ActiveNodes<dim>::sum_over_ranks(double *data, const unsigned int n_compone
       AssertThrowMPI(call);
     }
   };
-  const auto unpack = [&](const Share &share, const std::vector<double> &buffer, const bool add_up) {
+  const auto unpack = [&](const Share &share, const std::vector<double> &buffer, const bool combined) {
     const double *in = buffer.data();
     for (const std::uint32_t i : share.nodes)
       for (unsigned int c = 0; c < n_components; ++c) {
         double &value = data[std::size_t(i) * n_components + c];
-        value = add_up ? value + *in++ : *in++;
+        value = combined ? combine(value, *in) : *in;
+        ++in;
       }
   };
 

@@ -30,6 +30,11 @@ GridParameters<dim>::GridParameters(Section section)
     if (!(upper_corner[d] > lower_corner[d]))
       section.fail("Upper corner",
                    "each coordinate of 'Upper corner' must be larger than that of 'Lower corner'");
+    // Coordinates have 16 digits; places within a cell need some of them.
+    const double farthest = std::max(std::abs(lower_corner[d]), std::abs(upper_corner[d]));
+    if (upper_corner[d] - lower_corner[d] < 1e-10 * cells[d] * farthest)
+      section.fail("Upper corner",
+                   "the cells are lost in round-off so far from the origin; move the origin nearer");
     if (std::abs(cells[d] - std::round(cells[d])) > 1e-9 * cells[d])
       section.fail("Cells", "'Cells' must be whole numbers, got " + std::to_string(cells[d]));
     lower[d] = lower_corner[d];

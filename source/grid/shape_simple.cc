@@ -191,6 +191,8 @@ public:
   {
     if (contains_word(call.arguments[0], 't'))
       call.fail("it cannot depend on the time t");
+    if (dim == 2 && function.depends_on("z"))
+      call.fail("there is no z in 2-D; the vertical axis is y");
     const double origin[3] = {0., 0., 0.};
     if (function.is_constant() && function.value(origin, 0.) <= 0.)
       call.fail("is empty: the expression is never positive");

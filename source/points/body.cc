@@ -21,18 +21,18 @@ BodyParameters<dim>::BodyParameters(Section section, const std::vector<std::stri
   initial_pressure = Function("0", {}, {});
 
   section.add("Material", material, material_names, "The material it is made of.");
-  section.add("Shape", shape_text, "Its region at the start: box, ball, polygon, ..., combined by union, intersection, "
-                                   "difference (see the user guide).");
-  section.add("Points per cell", points_per_direction, between(1, 16), "Material points per cell in each direction.");
+  section.add("Shape", shape_text,
+              "Its region at the start: box, ball, polygon, ..., combined by union, intersection, "
+              "difference (see the user guide).");
+  section.add("Points per cell", points_per_direction, between(1, 16),
+              "Material points per cell in each direction.");
   section.add("Initial velocity", initial_velocity, dim, "m/s", "Velocity at the start.");
   section.add("Initial stress", initial_stress, n_stress, "Pa",
               dim == 2 ? "Effective stress at the start: xx, yy, zz, xy; tension positive."
                        : "Effective stress at the start: xx, yy, zz, xy, yz, zx; tension positive.");
   section.add("Initial pressure", initial_pressure, 1, "Pa", "Pore pressure at the start; saturated bodies.");
-  if (!section.describing() && !section.has("Shape"))
-    section.fail("Shape", "body '" + name + "' needs a 'Shape'");
-  if (!section.describing() && !section.has("Material"))
-    section.fail("Material", "body '" + name + "' needs a 'Material'");
+  section.require("Shape", "body '" + name + "'");
+  section.require("Material", "body '" + name + "'");
   shape = parse_shape<dim>(shape_text, section.constants(), section.origin("Shape"));
 }
 
@@ -47,50 +47,52 @@ Body<dim>::Body(const BodyParameters<dim> &parameters, const Material &material,
   attach_storage();
   initial_number = particles.n_global_particles();
   if (initial_number == 0)
-    parameters.section.fail("Shape", "body '" + body_name + "' has no material points: its shape lies outside the mesh "
-                                                            "or is smaller than the spacing of points");
+    parameters.section.fail("Shape", "body '" + body_name +
+                                         "' has no material points: its shape lies outside the mesh "
+                                         "or is smaller than the spacing of points");
 }
 
 namespace {
-  /// Half the mean edge lengths of what a box keeps of itself when it is cut.
-  template <int dim>
-  dealii::Tensor<1, dim> half_extents(const CutBox<dim> &part, const dealii::Tensor<1, dim> &edges)
-  {
-    dealii::Tensor<1, dim> half;
-    for (unsigned int d = 0; d < dim; ++d) {
-      const double cross_section = std::max(part.face_area[2 * d], part.face_area[2 * d + 1]);
-      const double length = cross_section > 0. ? part.volume / cross_section : std::pow(part.volume, 1. / dim);
-      half[d] = 0.5 * std::min(length, edges[d]);
-    }
-    return half;
+/// Half the mean edge lengths of what a box keeps of itself when it is cut.
+template <int dim>
+dealii::Tensor<1, dim> half_extents(const CutBox<dim> &part, const dealii::Tensor<1, dim> &edges)
+{
+  dealii::Tensor<1, dim> half;
+  for (unsigned int d = 0; d < dim; ++d) {
+    const double cross_section = std::max(part.face_area[2 * d], part.face_area[2 * d + 1]);
+    const double length = cross_section > 0. ? part.volume / cross_section : std::pow(part.volume, 1. / dim);
+    half[d] = 0.5 * std::min(length, edges[d]);
   }
+  return half;
+}
 
-  template <int dim>
-  void fill_row(std::vector<double> &row, const Layout &layout, const Material &material,
-                const BodyParameters<dim> &parameters, const CutBox<dim> &part, const dealii::Tensor<1, dim> &half_extent)
-  {
-    double x[3] = {0., 0., 0.};
+template <int dim>
+void fill_row(std::vector<double> &row, const Layout &layout, const Material &material,
+              const BodyParameters<dim> &parameters, const CutBox<dim> &part,
+              const dealii::Tensor<1, dim> &half_extent)
+{
+  double x[3] = {0., 0., 0.};
+  for (unsigned int d = 0; d < dim; ++d)
+    x[d] = part.centroid[d];
+  row.assign(layout.n_columns, 0.);
+  row[layout.mass] = material.density() * part.volume;
+  row[layout.volume] = part.volume;
+  for (unsigned int d = 0; d < dim; ++d)
+    row[layout.velocity + d] = parameters.initial_velocity.value(x, 0., d);
+  for (unsigned int c = 0; c < parameters.initial_stress.n_components(); ++c)
+    row[layout.stress + c] = parameters.initial_stress.value(x, 0., c);
+  if (layout.pressure >= 0)
+    row[layout.pressure] = parameters.initial_pressure.value(x, 0.);
+  if (layout.porosity >= 0)
+    row[layout.porosity] = material.mixture()->porosity();
+  if (layout.extent >= 0)
     for (unsigned int d = 0; d < dim; ++d)
-      x[d] = part.centroid[d];
-    row.assign(layout.n_columns, 0.);
-    row[layout.mass] = material.density() * part.volume;
-    row[layout.volume] = part.volume;
-    for (unsigned int d = 0; d < dim; ++d)
-      row[layout.velocity + d] = parameters.initial_velocity.value(x, 0., d);
-    for (unsigned int c = 0; c < parameters.initial_stress.n_components(); ++c)
-      row[layout.stress + c] = parameters.initial_stress.value(x, 0., c);
-    if (layout.pressure >= 0)
-      row[layout.pressure] = parameters.initial_pressure.value(x, 0.);
-    if (layout.porosity >= 0)
-      row[layout.porosity] = material.mixture()->porosity();
-    if (layout.extent >= 0)
-      for (unsigned int d = 0; d < dim; ++d)
-        row[layout.extent + d] = half_extent[d];
-    int column = layout.state;
-    for (const StateField &field : material.law().state())
-      for (const double value : field.initial)
-        row[column++] = value;
-  }
+      row[layout.extent + d] = half_extent[d];
+  int column = layout.state;
+  for (const StateField &field : material.law().state())
+    for (const double value : field.initial)
+      row[column++] = value;
+}
 } // namespace
 
 template <int dim>
@@ -114,10 +116,9 @@ void Body<dim>::seed(const BodyParameters<dim> &parameters)
 
   std::vector<double> row;
   std::uint32_t n_local = 0;
-  for (const auto &cell : grid.triangulation().active_cell_iterators()) {
+  std::string problem;
+  const auto make_points = [&](const auto &cell) {
     const CellId id = cell->active_cell_index();
-    if (!cell->is_locally_owned() || apart(id))
-      continue;
     for (unsigned int b = 0; b < n_boxes; ++b) {
       dealii::Point<dim> lower, upper;
       dealii::Tensor<1, dim> edges;
@@ -134,7 +135,21 @@ void Body<dim>::seed(const BodyParameters<dim> &parameters)
       const auto unit = grid.mapping().transform_real_to_unit_cell(cell, part.centroid);
       particles.insert_particle(part.centroid, unit, n_local++, cell, row);
     }
+  };
+  for (const auto &cell : grid.triangulation().active_cell_iterators()) {
+    if (!cell->is_locally_owned() || apart(cell->active_cell_index()))
+      continue;
+    try {
+      make_points(cell);
+    } catch (const NumericalError &error) {
+      // A function of the file that has no value somewhere. Other ranks may not meet that place.
+      problem = error.what();
+      break;
+    }
   }
+  for (const std::string &one : dealii::Utilities::MPI::all_gather(grid.communicator(), problem))
+    if (!one.empty())
+      throw InputError(one);
   number_points(n_local);
   particles.update_cached_numbers();
 }
@@ -210,8 +225,8 @@ typename Body<dim>::Relocation Body<dim>::relocate(const double time)
     return result;
   const auto complain = [&](const std::uint32_t handle, const std::string &what) {
     std::ostringstream message;
-    message << "point " << id(handle) << " of body '" << body_name << "' " << what << " at (" << position(handle)
-            << "), t = " << time << " s";
+    message << "point " << id(handle) << " of body '" << body_name << "' " << what << " at ("
+            << position(handle) << "), t = " << time << " s";
     throw NumericalError(message.str());
   };
   for (const std::uint32_t handle : moved_points) {
@@ -237,10 +252,9 @@ typename Body<dim>::Relocation Body<dim>::relocate(const double time)
   std::vector<Slice> before;
   before.swap(cell_slices);
   rebuild_slices();
-  result.cells_changed =
-      before.size() != cell_slices.size() ||
-      !std::equal(before.begin(), before.end(), cell_slices.begin(),
-                  [](const Slice &a, const Slice &b) { return a.cell == b.cell; });
+  result.cells_changed = before.size() != cell_slices.size() ||
+                         !std::equal(before.begin(), before.end(), cell_slices.begin(),
+                                     [](const Slice &a, const Slice &b) { return a.cell == b.cell; });
   return result;
 }
 

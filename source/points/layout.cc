@@ -25,7 +25,8 @@ Layout::Layout(const unsigned int dim, const Material &material, const SchemeFie
     extent = add("half extent", "m", dim, Kind::vector);
 }
 
-int Layout::add(const std::string &name, const std::string &unit, const unsigned int n_components, const Kind kind)
+int Layout::add(const std::string &name, const std::string &unit, const unsigned int n_components,
+                const Kind kind)
 {
   const int first = n_columns;
   fields.push_back({name, unit, first, n_components, n_components == 1 ? Kind::scalar : kind});

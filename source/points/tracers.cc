@@ -4,14 +4,27 @@
 #include <deal.II/base/mpi.h>
 
 namespace peat {
+namespace {
+/// Where a tracer belongs: a piece of surface to the cell of the material just behind it.
+template <int dim>
+typename Grid<dim>::Lattice home(const typename Tracers<dim>::Tracer &tracer, const Grid<dim> &grid)
+{
+  dealii::Point<dim> x = tracer.position;
+  if (const double area = tracer.area.norm(); area > 0.)
+    x -= 1e-7 * grid.smallest_cell_size() / area * tracer.area;
+  return grid.locate(x);
+}
+} // namespace
+
 template <int dim>
 CellId Tracers<dim>::own_cell(const Tracer &tracer) const
 {
-  return grid.cell_at(grid.locate(tracer.position));
+  return grid.cell_at(home<dim>(tracer, grid));
 }
 
 template <int dim>
-void Tracers<dim>::add(const std::uint32_t id, const dealii::Point<dim> &position, const dealii::Tensor<1, dim> &area)
+void Tracers<dim>::add(const std::uint32_t id, const dealii::Point<dim> &position,
+                       const dealii::Tensor<1, dim> &area)
 {
   const Tracer tracer{id, position, position, area};
   const CellId cell = own_cell(tracer);
@@ -20,19 +33,121 @@ void Tracers<dim>::add(const std::uint32_t id, const dealii::Point<dim> &positio
 }
 
 namespace {
-  /// How far inside the surface its tracers start, in cells: they belong to the cell of the material, not to the
-  /// empty one beyond the face.
-  constexpr double inset = 1e-7;
+template <int dim>
+Bounds<dim> neighbour_box(const Bounds<dim> &box, const unsigned int face)
+{
+  Bounds<dim> result = box;
+  const double h = box.upper[face / 2] - box.lower[face / 2];
+  result.lower[face / 2] += face % 2 ? h : -h;
+  result.upper[face / 2] += face % 2 ? h : -h;
+  return result;
+}
 
-  template <int dim>
-  Bounds<dim> neighbour_box(const Bounds<dim> &box, const unsigned int face)
-  {
-    Bounds<dim> result = box;
-    const double h = box.upper[face / 2] - box.lower[face / 2];
-    result.lower[face / 2] += face % 2 ? h : -h;
-    result.upper[face / 2] += face % 2 ? h : -h;
-    return result;
+/// One of n^dim equal parts of a box.
+template <int dim>
+Bounds<dim> part_of_box(const Bounds<dim> &box, const unsigned int n, const unsigned int part)
+{
+  Bounds<dim> result;
+  for (unsigned int d = 0, rest = part; d < dim; ++d, rest /= n) {
+    const double length = box.upper[d] - box.lower[d];
+    result.lower[d] = box.lower[d] + length * (rest % n) / n;
+    result.upper[d] = box.lower[d] + length * (rest % n + 1) / n;
   }
+  return result;
+}
+
+/// A plane piece of a shape's surface.
+template <int dim>
+struct Piece
+{
+  dealii::Point<dim> position;
+  dealii::Tensor<1, dim> area;
+};
+
+/// The pieces of a shape's surface in a box and on those of its faces beyond which there is nothing of the
+/// shape. Where the surface has an edge or a corner in the box, its parts are taken one by one.
+template <int dim>
+class PieceCollector
+{
+public:
+  PieceCollector(const Shape<dim> &shape, const Grid<dim> &grid) : shape(shape), grid(grid) {}
+
+  std::vector<Piece<dim>> collect(const Bounds<dim> &box, const unsigned int depth = 0) const
+  {
+    const CutBox<dim> part = cut(shape, box.lower, box.upper);
+    if (part.volume == 0.)
+      return {};
+    std::vector<Piece<dim>> pieces = on_faces(box, part);
+    const double smallest = 1e-9 * std::pow(box.upper[0] - box.lower[0], dim - 1);
+    if (part.interface.norm() <= smallest)
+      return pieces;
+
+    if (add_faces_along_axes(box, part, pieces))
+      return pieces;
+    constexpr unsigned int deepest = 3, n_parts = 1 << dim;
+    if (depth < deepest) {
+      std::vector<Piece<dim>> finer;
+      double area = 0., coarse_area = part.interface.norm();
+      for (const auto &piece : pieces)
+        coarse_area += piece.area.norm();
+      for (unsigned int i = 0; i < n_parts; ++i)
+        for (const auto &piece : collect(part_of_box(box, 2, i), depth + 1)) {
+          finer.push_back(piece);
+          area += piece.area.norm();
+        }
+      // A curved surface gains a little area by being resolved, an edge much more.
+      if (area > 1.02 * coarse_area)
+        return finer;
+    }
+    pieces.push_back({part.interface_centroid, part.interface});
+    return pieces;
+  }
+
+private:
+  /// If what is left of the box is a box itself: its faces inside the box, exactly.
+  static bool add_faces_along_axes(const Bounds<dim> &box, const CutBox<dim> &part,
+                                   std::vector<Piece<dim>> &pieces)
+  {
+    dealii::Tensor<1, dim> length;
+    double volume = 1.;
+    for (unsigned int d = 0; d < dim; ++d) {
+      length[d] = 2. * (part.interface[d] > 0.   ? part.centroid[d] - box.lower[d]
+                        : part.interface[d] < 0. ? box.upper[d] - part.centroid[d]
+                                                 : 0.5 * (box.upper[d] - box.lower[d]));
+      volume *= length[d];
+    }
+    if (std::abs(volume - part.volume) > 1e-10 * part.volume)
+      return false;
+    for (unsigned int d = 0; d < dim; ++d)
+      if (part.interface[d] != 0.) {
+        Piece<dim> piece{part.centroid, {}};
+        piece.position[d] = part.interface[d] > 0. ? box.lower[d] + length[d] : box.upper[d] - length[d];
+        piece.area[d] = std::copysign(volume / length[d], part.interface[d]);
+        pieces.push_back(piece);
+      }
+    return true;
+  }
+
+  std::vector<Piece<dim>> on_faces(const Bounds<dim> &box, const CutBox<dim> &part) const
+  {
+    std::vector<Piece<dim>> pieces;
+    const double smallest = 1e-9 * std::pow(box.upper[0] - box.lower[0], dim - 1);
+    for (unsigned int face = 0; face < 2 * dim; ++face) {
+      const Bounds<dim> beyond = neighbour_box(box, face);
+      if (part.face_area[face] <= smallest || !grid.contains(beyond.center()) ||
+          cut(shape, beyond.lower, beyond.upper).volume > 0.)
+        continue;
+      Piece<dim> piece{part.centroid, {}};
+      piece.position[face / 2] = face % 2 ? box.upper[face / 2] : box.lower[face / 2];
+      piece.area[face / 2] = (face % 2 ? 1. : -1.) * part.face_area[face];
+      pieces.push_back(piece);
+    }
+    return pieces;
+  }
+
+  const Shape<dim> &shape;
+  const Grid<dim> &grid;
+};
 } // namespace
 
 template <int dim>
@@ -40,10 +155,7 @@ void Tracers<dim>::cover(const Shape<dim> &shape, const unsigned int pieces_per_
 {
   const unsigned int n = pieces_per_direction;
   const unsigned int n_boxes = dim == 2 ? n * n : n * n * n;
-  const auto put = [&](dealii::Point<dim> x, const dealii::Tensor<1, dim> &area, const double h) {
-    x -= inset * h * area / area.norm();
-    list.push_back({std::uint32_t(list.size()), x, x, area});
-  };
+  const PieceCollector<dim> collector(shape, grid);
   for (CellId cell = 0; cell < grid.n_local_cells(); ++cell) {
     if (!grid.is_owned(cell))
       continue;
@@ -54,31 +166,9 @@ void Tracers<dim>::cover(const Shape<dim> &shape, const unsigned int pieces_per_
     }
     if (shape.is_distance() && std::abs(shape.distance(cell_box.center())) > 1.1 * cell_box.radius())
       continue;
-    for (unsigned int b = 0; b < n_boxes; ++b) {
-      Bounds<dim> box;
-      for (unsigned int d = 0, rest = b; d < dim; ++d, rest /= n) {
-        box.lower[d] = cell_box.lower[d] + grid.size(cell, d) * (rest % n) / n;
-        box.upper[d] = cell_box.lower[d] + grid.size(cell, d) * (rest % n + 1) / n;
-      }
-      const CutBox<dim> part = cut(shape, box.lower, box.upper);
-      if (part.volume == 0.)
-        continue;
-      const double h = box.upper[0] - box.lower[0];
-      const double face_scale = std::pow(h, dim - 1);
-      if (part.interface.norm() > 1e-9 * face_scale)
-        put(part.interface_centroid, part.interface, h);
-      for (unsigned int face = 0; face < 2 * dim; ++face) {
-        const Bounds<dim> beyond = neighbour_box(box, face);
-        if (part.face_area[face] <= 1e-9 * face_scale || !grid.contains(beyond.center()) ||
-            cut(shape, beyond.lower, beyond.upper).volume > 0.)
-          continue;
-        dealii::Point<dim> x = part.centroid;
-        x[face / 2] = face % 2 ? box.upper[face / 2] : box.lower[face / 2];
-        dealii::Tensor<1, dim> area;
-        area[face / 2] = (face % 2 ? 1. : -1.) * part.face_area[face];
-        put(x, area, h);
-      }
-    }
+    for (unsigned int b = 0; b < n_boxes; ++b)
+      for (const Piece<dim> &piece : collector.collect(part_of_box(cell_box, n, b)))
+        list.push_back({std::uint32_t(list.size()), piece.position, piece.position, piece.area});
   }
 }
 
@@ -88,7 +178,7 @@ CellId Tracers<dim>::carrier(const Tracer &tracer, const ActiveNodes<dim> &nodes
   const CellId own = own_cell(tracer);
   if (own != no_index && nodes.is_occupied(own))
     return own;
-  const auto lattice = grid.locate(tracer.position);
+  const auto lattice = home<dim>(tracer, grid);
   // First the cell behind the surface, then any other neighbour.
   if (tracer.area.norm_square() > 0.) {
     unsigned int axis = 0;
@@ -129,16 +219,29 @@ void Tracers<dim>::locate(const ActiveNodes<dim> &nodes)
       point.N.fill(0.);
       continue;
     }
-    double xi[dim];
-    for (unsigned int d = 0; d < dim; ++d)
-      xi[d] = std::min(1., std::max(0., (point.position[d] - grid.lower(cell, d)) / grid.size(cell, d)));
+    // With four nodes per direction the cell's neighbours are within reach, and the piece acts where it is: a
+    // sliver of material beyond the last full cell then gets its share of the load. With two it acts at the
+    // cell's face.
+    const auto base = grid.lattice(cell);
+    std::array<int, dim> first;
+    point.N.fill(1.);
+    for (unsigned int d = 0; d < dim; ++d) {
+      const auto &planes = grid.planes(d);
+      int i = base[d];
+      if (reach == 4 && point.position[d] > planes[i + 1] && i + 1 < grid.n_cells(d))
+        ++i;
+      else if (reach == 4 && point.position[d] < planes[i] && i > 0)
+        --i;
+      first[d] = i - base[d] + (reach == 4 ? 1 : 0);
+      const double xi =
+          std::min(1., std::max(0., (point.position[d] - planes[i]) / (planes[i + 1] - planes[i])));
+      for (unsigned int v = 0; v < point.n_nodes; ++v)
+        point.N[v] *= (v >> d) & 1 ? xi : 1. - xi;
+    }
     for (unsigned int v = 0; v < point.n_nodes; ++v) {
       unsigned int local = 0;
-      point.N[v] = 1.;
-      for (int d = dim - 1; d >= 0; --d) {
-        local = local * reach + ((v >> d) & 1) + (reach == 4 ? 1 : 0);
-        point.N[v] *= (v >> d) & 1 ? xi[d] : 1. - xi[d];
-      }
+      for (int d = dim - 1; d >= 0; --d)
+        local = local * reach + first[d] + ((v >> d) & 1);
       point.node[v] = nodes.cell_nodes(cell)[local];
     }
   }
@@ -159,7 +262,8 @@ void Tracers<dim>::move(const std::vector<double> &velocity, const double dt, co
     dealii::Tensor<2, dim> gradient;
     for (unsigned int i = 0; i < point.n_nodes; ++i)
       for (unsigned int e = 0; e < dim; ++e) {
-        double slope = (i >> e) & 1 ? 1. / grid.size(carrier_cell[t], e) : -1. / grid.size(carrier_cell[t], e);
+        double slope =
+            (i >> e) & 1 ? 1. / grid.size(carrier_cell[t], e) : -1. / grid.size(carrier_cell[t], e);
         for (unsigned int d = 0; d < dim; ++d)
           if (d != e) {
             const double xi = std::min(1., std::max(0., (point.position[d] - grid.lower(carrier_cell[t], d)) /

@@ -1,5 +1,8 @@
 #include <peat/simulation/case.h>
 
+#include <peat/base/text.h>
+
+#include <cmath>
 #include <sstream>
 
 namespace peat {
@@ -8,11 +11,11 @@ StageParameters::StageParameters(Section section) : name(section.name())
   std::string solver = "mpm";
   section.add("Solver", solver, {"mpm"}, "'mpm': the explicit coupled material point method.");
   section.add("Duration", duration, positive("s"), "How long the stage lasts.");
-  section.add("Local damping", local_damping, between(0., 0.99),
-              "Share of each node's out-of-balance force that acts against its velocity in this stage; for dynamic "
-              "relaxation to rest.");
-  if (!section.describing() && !section.has("Duration"))
-    section.fail("Duration", "stage '" + name + "' needs a 'Duration'");
+  section.add(
+      "Local damping", local_damping, between(0., 0.99),
+      "Share of each node's out-of-balance force that acts against its velocity in this stage; for dynamic "
+      "relaxation to rest.");
+  section.require("Duration", "stage '" + name + "'");
 }
 
 unsigned int read_dimension(const ParameterFile &file)
@@ -22,102 +25,131 @@ unsigned int read_dimension(const ParameterFile &file)
   root.add("Dimension", dimension, between(2, 3), "2 (plane strain) or 3.");
   if (dimension != 2 && dimension != 3)
     root.fail("Dimension", "'Dimension' must be 2 or 3");
+  root.set_dimension(dimension == 2 ? 2 : 3);
   return dimension == 2 ? 2 : 3;
 }
 
 namespace {
-  std::string read_title(Section root)
-  {
-    std::string title;
-    root.add("Title", title, "A name for the run.");
-    return title;
-  }
+std::string read_title(Section root)
+{
+  std::string title;
+  root.add("Title", title, "A name for the run.");
+  return title;
+}
 
-  std::vector<std::unique_ptr<Material>> read_materials(const Section &section)
-  {
-    std::vector<std::unique_ptr<Material>> materials;
-    for (const std::string &name : section.user_sections("MATERIAL"))
-      materials.push_back(std::make_unique<Material>(section.subsection(name)));
-    return materials;
-  }
+std::vector<std::unique_ptr<Material>> read_materials(const Section &section)
+{
+  std::vector<std::unique_ptr<Material>> materials;
+  for (const std::string &name : section.user_sections("MATERIAL"))
+    materials.push_back(std::make_unique<Material>(section.subsection(name)));
+  return materials;
+}
 
-  template <typename Named>
-  std::vector<std::string> names(const std::vector<Named> &list)
-  {
-    std::vector<std::string> result;
-    for (const auto &item : list)
-      result.push_back(item.name);
-    return result;
-  }
+template <typename Named>
+std::vector<std::string> names(const std::vector<Named> &list)
+{
+  std::vector<std::string> result;
+  for (const auto &item : list)
+    result.push_back(item.name);
+  return result;
+}
 
-  template <int dim>
-  std::vector<BodyParameters<dim>> read_bodies(const Section &section,
-                                               const std::vector<std::unique_ptr<Material>> &materials)
-  {
-    std::vector<std::string> material_names;
-    for (const auto &material : materials)
-      material_names.push_back(material->name());
-    if (material_names.empty())
-      section.fail("", "the file has no material: a section 'Materials' with one subsection a material is needed");
-    std::vector<BodyParameters<dim>> bodies;
-    for (const std::string &name : section.user_sections("BODY"))
-      bodies.emplace_back(section.subsection(name), material_names);
-    if (bodies.empty())
-      section.fail("", "the file has no body: a section 'Bodies' with one subsection a body is needed");
-    return bodies;
-  }
+template <int dim>
+std::vector<BodyParameters<dim>> read_bodies(const Section &section,
+                                             const std::vector<std::unique_ptr<Material>> &materials)
+{
+  std::vector<std::string> material_names;
+  for (const auto &material : materials)
+    material_names.push_back(material->name());
+  if (material_names.empty())
+    section.fail("",
+                 "the file has no material: a section 'Materials' with one subsection a material is needed");
+  std::vector<BodyParameters<dim>> bodies;
+  for (const std::string &name : section.user_sections("BODY"))
+    bodies.emplace_back(section.subsection(name), material_names);
+  if (bodies.empty())
+    section.fail("", "the file has no body: a section 'Bodies' with one subsection a body is needed");
+  return bodies;
+}
 
-  template <int dim>
-  std::vector<std::unique_ptr<Condition<dim>>> read_conditions(const Section &section,
-                                                               const std::vector<std::string> &bodies)
-  {
-    std::vector<std::unique_ptr<Condition<dim>>> conditions;
-    for (const std::string &name : section.user_sections("CONDITION"))
-      conditions.push_back(make_condition<dim>(section.subsection(name), bodies));
-    return conditions;
-  }
+template <int dim>
+std::vector<std::unique_ptr<Condition<dim>>> read_conditions(const Section &section,
+                                                             const std::vector<std::string> &bodies)
+{
+  std::vector<std::unique_ptr<Condition<dim>>> conditions;
+  for (const std::string &name : section.user_sections("CONDITION"))
+    conditions.push_back(make_condition<dim>(section.subsection(name), bodies));
+  return conditions;
+}
 
-  template <int dim>
-  Function read_gravity(Section root)
-  {
-    Function gravity(dim == 2 ? "0, 0" : "0, 0, 0", {}, {});
-    root.add("Gravity", gravity, dim, "m/s^2",
-             "Acceleration of gravity; may depend on t, e.g. 0, -9.81*min(1, t/0.1).");
-    if (!gravity.is_uniform())
-      root.fail("Gravity", "'Gravity' may depend on t but not on place");
-    return gravity;
-  }
+template <int dim>
+Function read_gravity(Section root)
+{
+  Function gravity(dim == 2 ? "0, 0" : "0, 0, 0", {}, {});
+  root.add("Gravity", gravity, dim, "m/s^2",
+           "Acceleration of gravity; may depend on t, e.g. 0, -9.81*min(1, t/0.1).");
+  if (!gravity.is_uniform())
+    root.fail("Gravity", "'Gravity' may depend on t but not on place");
+  root.require_start("Gravity", gravity);
+  return gravity;
+}
 
-  SchemeParameters read_scheme(Section root)
-  {
-    SchemeParameters scheme(root.subsection("Explicit MPM"));
-    root.add("Seepage inertia", scheme.seepage_inertia,
-             "Keep the term rho_f a in Darcy's law (the full u-p form). Without it the form is well posed for every "
-             "material.");
-    return scheme;
-  }
+SchemeParameters read_scheme(Section root)
+{
+  SchemeParameters scheme(root.subsection("Explicit MPM"));
+  root.add(
+      "Seepage inertia", scheme.seepage_inertia,
+      "Keep the term rho_f a in Darcy's law (the full u-p form). Without it the form is well posed for every "
+      "material.");
+  return scheme;
+}
 
-  template <typename Parameters, typename... Arguments>
-  std::vector<Parameters> read_list(const Section &section, const std::string &example,
-                                    const Arguments &... arguments)
-  {
-    std::vector<Parameters> list;
-    for (const std::string &name : section.user_sections(example))
-      list.emplace_back(section.subsection(name), arguments...);
-    return list;
-  }
+template <typename Parameters, typename... Arguments>
+std::vector<Parameters> read_list(const Section &section, const std::string &example,
+                                  const Arguments &...arguments)
+{
+  std::vector<Parameters> list;
+  for (const std::string &name : section.user_sections(example))
+    list.emplace_back(section.subsection(name), arguments...);
+  return list;
+}
+} // namespace
+
+namespace {
+/// Whether a stress that comes with no strain survives an update.
+bool keeps_stress(const Law &law)
+{
+  std::vector<Lanes> state;
+  for (const StateField &field : law.state())
+    for (const double value : field.initial)
+      state.push_back(broadcast(value));
+  StressLanes stress;
+  stress.fill(broadcast(1.));
+  law.update({}, stress, state.data());
+  return std::abs(stress[0][0] - 1.) < 1e-6;
+}
+
+bool is_zero(const Function &function)
+{
+  const double origin[3] = {0., 0., 0.};
+  bool zero = function.is_constant();
+  for (unsigned int c = 0; c < function.n_components() && zero; ++c)
+    zero = function.value(origin, 0., c) == 0.;
+  return zero;
+}
 } // namespace
 
 template <int dim>
 Case<dim>::Case(const ParameterFile &file)
-    : title(read_title(file.root())), grid(file.root().subsection("Grid")),
+    : section(file.root()), title(read_title(file.root())), grid(file.root().subsection("Grid")),
       materials(read_materials(file.root().subsection("Materials"))),
       bodies(read_bodies<dim>(file.root().subsection("Bodies"), materials)),
       conditions(read_conditions<dim>(file.root().subsection("Conditions"), names(bodies))),
       gravity(read_gravity<dim>(file.root())), scheme(read_scheme(file.root())),
       stages(read_list<StageParameters>(file.root().subsection("Stages"), "STAGE")),
       probes(read_list<ProbeParameters<dim>>(file.root().subsection("Probes"), "PROBE")),
-      references(read_list<ReferenceParameters<dim>>(file.root().subsection("References"), "REFERENCE", names(probes))),
+      references(read_list<ReferenceParameters<dim>>(file.root().subsection("References"), "REFERENCE",
+                                                     names(probes))),
       output(file.root().subsection("Output"))
 {
   if (file.root().describing())
@@ -134,17 +166,24 @@ void Case<dim>::check(const Section &root) const
   for (const auto &body : bodies) {
     const Mixture *mixture = material(body.material).mixture();
     if (!mixture && body.section.has("Initial pressure"))
-      body.section.fail("Initial pressure", "body '" + body.name + "' is of the dry material '" + body.material +
-                                                "' and has no pore pressure");
+      body.section.fail("Initial pressure", "body '" + body.name + "' is of the dry material '" +
+                                                body.material + "' and has no pore pressure");
+    if (!keeps_stress(material(body.material).law()) && !is_zero(body.initial_stress))
+      body.section.fail("Initial stress",
+                        "with the law of material '" + body.material +
+                            "' stress follows from strain alone, and the body starts without strain; "
+                            "use 'linear elastic' or 'jaumann'");
     if (!mixture || !scheme.seepage_inertia)
       continue;
     const double M = material(body.material).initial_modulus();
     if (mixture->well_posedness(M) <= 0.) {
       std::ostringstream message;
       const double r = mixture->r();
-      message << "with material '" << body.material << "' the u-p form with seepage inertia is ill-posed: it needs "
-              << "alpha^2 Q (1 - r) > r M, but " << std::pow(mixture->biot_coefficient(), 2) * mixture->Q() * (1. - r)
-              << " < " << r * M << " Pa (r = alpha rho_f/rho); set 'Seepage inertia = false', or a stiffer fluid";
+      message << "with material '" << body.material
+              << "' the u-p form with seepage inertia is ill-posed: it needs "
+              << "alpha^2 Q (1 - r) > r M, but "
+              << std::pow(mixture->biot_coefficient(), 2) * mixture->Q() * (1. - r) << " < " << r * M
+              << " Pa (r = alpha rho_f/rho); set 'Seepage inertia = false', or a stiffer fluid";
       root.subsection("Materials").subsection(body.material).fail("", message.str());
     }
   }
@@ -152,6 +191,19 @@ void Case<dim>::check(const Section &root) const
     if (condition->concerns_fluid() && !is_saturated())
       condition->section.fail("Kind", "condition '" + condition->name +
                                           "' is about pore fluid, but no body is saturated");
+  for (const auto &condition : conditions)
+    for (const auto &body : bodies)
+      if (condition->concerns_fluid() && condition->surface_of() == body.name &&
+          !material(body.material).mixture())
+        condition->section.fail("Where", "condition '" + condition->name +
+                                             "' is about pore fluid, but body '" + body.name + "' is dry");
+  constexpr double most_lines = 1e7;
+  const Section section = root.subsection("Output");
+  for (const auto &[key, interval] : {std::make_pair("Interval", output.interval),
+                                      std::make_pair("Statistics interval", output.statistics_interval),
+                                      std::make_pair("Probe interval", output.probe_interval)})
+    if (interval > 0. && end_time() / interval > most_lines)
+      section.fail(key, "in " + to_text(end_time()) + " s this makes more than 1e7 entries");
 }
 
 template <int dim>

@@ -4,85 +4,89 @@
 #include <deal.II/base/mpi.h>
 
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 #include <sstream>
 
 namespace peat {
 namespace {
-  template <int dim>
-  int run(const ParameterFile &file, const RunOptions &options, MPI_Comm communicator)
-  {
-    Case<dim> parameters(file);
-    catch_signals();
-    Simulation<dim> simulation(parameters, file, options, communicator);
-    return simulation.run() ? exit_success : exit_interrupted;
-  }
+template <int dim>
+int run(const ParameterFile &file, const RunOptions &options, MPI_Comm communicator)
+{
+  Case<dim> parameters(file);
+  catch_signals();
+  Simulation<dim> simulation(parameters, file, options, communicator);
+  return simulation.run() ? exit_success : exit_interrupted;
+}
 
-  /// Seconds that a step takes, from a few of them.
-  template <int dim>
-  double measure_step(ExplicitMPM<dim> &solver, const double dt)
-  {
-    const auto start = std::chrono::steady_clock::now();
-    double elapsed = 0.;
-    unsigned int n = 0;
-    do {
-      solver.step(dt);
-      ++n;
-      elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    } while (elapsed < 0.2 && n < 1000);
-    return elapsed / n;
-  }
+/// Seconds that a step takes, from a few of them.
+template <int dim>
+double measure_step(ExplicitMPM<dim> &solver, const double dt)
+{
+  const auto start = std::chrono::steady_clock::now();
+  double elapsed = 0.;
+  unsigned int n = 0;
+  do {
+    solver.step(dt);
+    ++n;
+    elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  } while (elapsed < 0.2 && n < 1000);
+  return elapsed / n;
+}
 
-  template <int dim>
-  int check(const ParameterFile &file, MPI_Comm communicator)
-  {
-    Case<dim> parameters(file);
-    const bool first = dealii::Utilities::MPI::this_mpi_process(communicator) == 0;
-    Log log("", first, false);
-    Grid<dim> grid(parameters.grid, communicator);
-    Scene<dim> scene = make_scene(parameters, grid);
-    ExplicitMPM<dim> solver(parameters.scheme, grid, scene, 0.);
-    solver.prepare();
+template <int dim>
+int check(const ParameterFile &file, const RunOptions &options, MPI_Comm communicator)
+{
+  Case<dim> parameters(file);
+  const bool first = dealii::Utilities::MPI::this_mpi_process(communicator) == 0;
+  Log log("", first, false);
+  Grid<dim> grid(parameters.grid, communicator);
+  Scene<dim> scene = make_scene(parameters, grid);
+  const Comparison<dim> comparison(parameters, std::filesystem::path(options.file).parent_path().string());
+  ExplicitMPM<dim> solver(parameters.scheme, grid, scene, 0.);
+  solver.prepare();
 
-    std::size_t n_active = solver.nodes().occupied_cells().size();
-    n_active = dealii::Utilities::MPI::sum(n_active, communicator);
-    std::ostringstream text;
-    text << (parameters.title.empty() ? "case" : parameters.title) << ": " << dim << "-D, "
-         << dealii::Utilities::MPI::n_mpi_processes(communicator) << " rank(s)\n";
-    for (const auto &body : scene.bodies)
-      text << "body '" << body->name() << "': " << body->n_global_points() << " points of '"
-           << body->material().name() << "', " << body->layout().n_columns << " values each\n";
-    text << "cells: " << grid.triangulation().n_global_active_cells() << ", of them " << n_active
-         << " hold points\n";
+  std::size_t n_active = solver.nodes().occupied_cells().size();
+  n_active = dealii::Utilities::MPI::sum(n_active, communicator);
+  std::ostringstream text;
+  text << (parameters.title.empty() ? "case" : parameters.title) << ": " << dim << "-D, "
+       << dealii::Utilities::MPI::n_mpi_processes(communicator) << " rank(s)\n";
+  for (const auto &body : scene.bodies)
+    text << "body '" << body->name() << "': " << body->n_global_points() << " points of '"
+         << body->material().name() << "', " << body->layout().n_columns << " values each\n";
+  text << "cells: " << grid.triangulation().n_global_active_cells() << ", of them " << n_active
+       << " hold points\n";
 
-    dealii::Utilities::System::MemoryStats memory;
-    dealii::Utilities::System::get_memory_stats(memory);
-    text << "memory of this process: " << readable_bytes(1024. * memory.VmRSS) << '\n';
+  dealii::Utilities::System::MemoryStats memory;
+  dealii::Utilities::System::get_memory_stats(memory);
+  text << "memory of this process: " << readable_bytes(1024. * memory.VmRSS) << '\n';
 
-    const StableStep stable = solver.stable_step();
-    const double dt = parameters.scheme.fixed_step > 0. ? parameters.scheme.fixed_step
-                                                        : parameters.scheme.step_factor * stable.dt;
-    const double n_steps = std::ceil(parameters.end_time() / dt);
-    text << "stable step: " << stable.dt << " s, limit: " << stable.limit << '\n'
-         << "steps: about " << n_steps << " of " << dt << " s for " << parameters.end_time() << " s";
-    log.line(text.str());
-    const double cost = measure_step(solver, std::min(dt, stable.dt));
-    log.line("run time: about " + readable_duration(n_steps * cost) + " without output (" +
-             readable_duration(cost) + " a step, measured now)");
-    return exit_success;
-  }
+  const StableStep stable = solver.stable_step();
+  const double dt = parameters.scheme.fixed_step > 0. ? parameters.scheme.fixed_step
+                                                      : parameters.scheme.step_factor * stable.dt;
+  const double n_steps = std::ceil(parameters.end_time() / dt);
+  text << "stable step: " << stable.dt << " s, limit: " << stable.limit << '\n'
+       << "steps: about " << n_steps << " of " << dt << " s for " << parameters.end_time() << " s";
+  log.line(text.str());
+  const double cost = measure_step(solver, std::min(dt, stable.dt));
+  log.line("run time: about " + readable_duration(n_steps * cost) + " without output (" +
+           readable_duration(cost) + " a step, measured now)");
+  return exit_success;
+}
 } // namespace
 
 int command_run(const RunOptions &options, MPI_Comm communicator)
 {
   const ParameterFile file(options.file, options.overrides);
-  return read_dimension(file) == 2 ? run<2>(file, options, communicator) : run<3>(file, options, communicator);
+  return read_dimension(file) == 2 ? run<2>(file, options, communicator)
+                                   : run<3>(file, options, communicator);
 }
 
 int command_check(const RunOptions &options, MPI_Comm communicator)
 {
   const ParameterFile file(options.file, options.overrides);
-  return read_dimension(file) == 2 ? check<2>(file, communicator) : check<3>(file, communicator);
+  return read_dimension(file) == 2 ? check<2>(file, options, communicator)
+                                   : check<3>(file, options, communicator);
 }
 
 int command_parameters(const std::string &format, const unsigned int dim)

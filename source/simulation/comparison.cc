@@ -131,7 +131,11 @@ Comparison<dim>::Comparison(const Case<dim> &parameters, const std::string &dire
       reference.unit = access.available() ? access.unit() : reference.unit;
     }
     if (given.kind != ReferenceParameters<dim>::Kind::formula)
-      read_table(reference, directory);
+      read_table(reference, directory, parameters);
+    if (is_history(given) && given.start >= parameters.end_time())
+      given.section.fail("Start", "reference '" + given.name +
+                                      "' is to be compared from t = " + to_text(given.start) +
+                                      " s on, but the run ends at " + to_text(parameters.end_time()) + " s");
     if (is_history(given)) {
       for (const auto &probe : parameters.probes)
         reference.place = probe.name == given.probe ? probe.point : reference.place;
@@ -152,9 +156,12 @@ Comparison<dim>::Comparison(const Case<dim> &parameters, const std::string &dire
 }
 
 template <int dim>
-void Comparison<dim>::read_table(Reference &reference, const std::string &directory) const
+void Comparison<dim>::read_table(Reference &reference, const std::string &directory,
+                                 const Case<dim> &parameters) const
 {
   const ReferenceParameters<dim> &given = *reference.parameters;
+  const double lower = is_history(given) ? given.start : parameters.grid.lower[given.axis];
+  const double upper = is_history(given) ? parameters.end_time() : parameters.grid.upper[given.axis];
   const std::filesystem::path path(given.file);
   const std::string file =
       path.is_absolute() ? given.file : (std::filesystem::path(directory) / path).string();
@@ -178,8 +185,15 @@ void Comparison<dim>::read_table(Reference &reference, const std::string &direct
   for (const std::string &column : given.columns) {
     require("Columns", column);
     reference.curves.emplace_back(table.column(coordinate), table.column(column));
-    if (reference.curves.back().empty())
+    const Curve &curve = reference.curves.back();
+    if (curve.empty())
       given.section.fail("Columns", "table '" + file + "' has no numbers in column " + in_quotes(column));
+    if (curve.upper() < lower || curve.lower() > upper)
+      given.section.fail(given.coordinate.empty() ? "File" : "Coordinate",
+                         "nothing is compared: table '" + file + "' goes from " + to_text(curve.lower()) +
+                             " to " + to_text(curve.upper()) + ", the " +
+                             (is_history(given) ? "run" : "mesh") + " from " + to_text(lower) + " to " +
+                             to_text(upper));
   }
 }
 

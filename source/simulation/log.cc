@@ -8,8 +8,8 @@
 
 namespace peat {
 Log::Log(const std::string &directory, const bool is_first_rank, const bool quiet)
-    : active(is_first_rank), quiet(quiet), terminal(isatty(STDOUT_FILENO)), start(std::chrono::steady_clock::now()),
-      last_progress(start)
+    : active(is_first_rank), quiet(quiet), terminal(isatty(STDOUT_FILENO)),
+      start(std::chrono::steady_clock::now()), last_progress(start)
 {
   if (active && !directory.empty()) {
     file.open(directory + "/log.txt");
@@ -52,8 +52,8 @@ void Log::progress(const double fraction, const double time, const unsigned long
   last_progress = now;
   const double elapsed = std::chrono::duration<double>(now - start).count();
   char text[160];
-  std::snprintf(text, sizeof(text), "%5.1f %%  t = %.4g s  step %lu  %.1f million point-steps/s  %s to go", 100. * fraction,
-                time, step, 1e-6 * point_steps_per_second,
+  std::snprintf(text, sizeof(text), "%5.1f %%  t = %.4g s  step %lu  %.1f million point-steps/s  %s to go",
+                100. * fraction, time, step, 1e-6 * point_steps_per_second,
                 fraction > 0. ? readable_duration(elapsed * (1. - fraction) / fraction).c_str() : "?");
   if (terminal)
     std::cout << "\r\033[K" << text << std::flush;

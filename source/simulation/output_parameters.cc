@@ -6,7 +6,9 @@ ProbeParameters<dim>::ProbeParameters(Section section) : section(section), name(
 {
   std::vector<double> x(dim, 0.);
   section.add("Point", x, dim, any("m"), "Where it is at the start.");
-  section.add("Follow material", follow, "Move with the material that is there at the start; otherwise stay in place.");
+  section.add("Follow material", follow,
+              "Move with the material that is there at the start; otherwise stay in place.");
+  section.require("Point", "probe '" + name + "'");
   for (unsigned int d = 0; d < dim; ++d)
     point[d] = x[d];
 }

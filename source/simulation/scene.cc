@@ -1,24 +1,27 @@
+#include <peat/simulation/scene_check.h>
 #include <peat/simulation/simulation.h>
 
 #include <deal.II/base/mpi.h>
 
 namespace peat {
 namespace {
-  /// A shape must not be cut off silently by the mesh.
-  template <int dim>
-  void check_inside_mesh(const BodyParameters<dim> &body, const GridParameters<dim> &grid)
-  {
-    const auto bounds = body.shape->bounds();
-    for (unsigned int d = 0; d < dim; ++d) {
-      const double tolerance = 1e-9 * (grid.upper[d] - grid.lower[d]);
-      if (bounds.upper[d] <= grid.lower[d] || bounds.lower[d] >= grid.upper[d])
-        body.section.fail("Shape", "body '" + body.name + "' lies outside the mesh");
-      const bool bounded = std::isfinite(bounds.lower[d]) && std::isfinite(bounds.upper[d]);
-      if (bounded && (bounds.lower[d] < grid.lower[d] - tolerance || bounds.upper[d] > grid.upper[d] + tolerance))
-        body.section.fail("Shape", "body '" + body.name + "' reaches beyond the mesh; enlarge the mesh, or cut the "
-                                                           "shape with intersection(..., box(...))");
-    }
+/// A shape must not be cut off silently by the mesh.
+template <int dim>
+void check_inside_mesh(const BodyParameters<dim> &body, const GridParameters<dim> &grid)
+{
+  const auto bounds = body.shape->bounds();
+  for (unsigned int d = 0; d < dim; ++d) {
+    const double tolerance = 1e-9 * (grid.upper[d] - grid.lower[d]);
+    if (bounds.upper[d] <= grid.lower[d] || bounds.lower[d] >= grid.upper[d])
+      body.section.fail("Shape", "body '" + body.name + "' lies outside the mesh");
+    const bool bounded = std::isfinite(bounds.lower[d]) && std::isfinite(bounds.upper[d]);
+    if (bounded &&
+        (bounds.lower[d] < grid.lower[d] - tolerance || bounds.upper[d] > grid.upper[d] + tolerance))
+      body.section.fail("Shape", "body '" + body.name +
+                                     "' reaches beyond the mesh; enlarge the mesh, or cut the "
+                                     "shape with intersection(..., box(...))");
   }
+}
 } // namespace
 
 template <int dim>
@@ -50,6 +53,7 @@ Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid)
     }
   }
   scene.conditions = std::move(parameters.conditions);
+  check_scene(parameters, scene, grid);
   return scene;
 }
 

@@ -10,28 +10,29 @@
 
 namespace peat {
 namespace {
-  volatile std::sig_atomic_t signal_received = 0;
+volatile std::sig_atomic_t signal_received = 0;
 
-  double seconds()
-  {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-  }
+double seconds()
+{
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
-  std::string prepare_directory(const RunOptions &options, MPI_Comm communicator)
-  {
-    const std::string directory = options.output.empty() ? default_output_directory(options.file) : options.output;
-    std::string problem;
-    if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0) {
-      std::error_code error;
-      std::filesystem::create_directories(directory, error);
-      if (error || !std::filesystem::is_directory(directory))
-        problem = "cannot make the output directory '" + directory + "'";
-    }
-    problem = dealii::Utilities::MPI::broadcast(communicator, problem);
-    if (!problem.empty())
-      throw InputError(problem);
-    return directory;
+std::string prepare_directory(const RunOptions &options, MPI_Comm communicator)
+{
+  const std::string directory =
+      options.output.empty() ? default_output_directory(options.file) : options.output;
+  std::string problem;
+  if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0) {
+    std::error_code error;
+    std::filesystem::create_directories(directory, error);
+    if (error || !std::filesystem::is_directory(directory))
+      problem = "cannot make the output directory '" + directory + "'";
   }
+  problem = dealii::Utilities::MPI::broadcast(communicator, problem);
+  if (!problem.empty())
+    throw InputError(problem);
+  return directory;
+}
 } // namespace
 
 void catch_signals()
@@ -58,10 +59,9 @@ void StepRecord::add(const double dt)
 template <int dim>
 struct Simulation<dim>::Outputs
 {
-  Outputs(const Case<dim> &parameters, const RunOptions &options, const std::string &directory,
-          const Scene<dim> &scene, const Grid<dim> &grid)
-      : statistics(directory, dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0),
-        comparison(parameters, std::filesystem::path(options.file).parent_path().string())
+  Outputs(const Case<dim> &parameters, const std::string &directory, const Scene<dim> &scene,
+          const Grid<dim> &grid)
+      : statistics(directory, dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0)
   {
     if (scene.probes)
       probes = std::make_unique<ProbeWriter<dim>>(parameters, scene, grid, directory + "/probes.csv");
@@ -69,7 +69,8 @@ struct Simulation<dim>::Outputs
       pictures = std::make_unique<Pictures<dim>>(directory, scene, grid.communicator());
   }
 
-  void plan(const OutputParameters &output, const double start, const double end)
+  void plan(const OutputParameters &output, const Comparison<dim> &comparison, const double start,
+            const double end)
   {
     const double statistics_interval =
         output.statistics_interval > 0. ? output.statistics_interval : (end - start) / 200.;
@@ -92,7 +93,6 @@ struct Simulation<dim>::Outputs
   }
 
   Statistics<dim> statistics;
-  Comparison<dim> comparison;
   std::unique_ptr<ProbeWriter<dim>> probes;
   std::unique_ptr<Pictures<dim>> pictures;
   Schedule statistics_times, probe_times, picture_times, comparison_times;
@@ -102,16 +102,18 @@ template <int dim>
 Simulation<dim>::Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options,
                             MPI_Comm communicator)
     : begin(seconds()), parameters(parameters), options(options), communicator(communicator),
+      grid(parameters.grid, communicator), scene(make_scene(parameters, grid)),
+      comparison(parameters, std::filesystem::path(options.file).parent_path().string()),
       directory(prepare_directory(options, communicator)),
       log(directory, dealii::Utilities::MPI::this_mpi_process(communicator) == 0, options.quiet),
-      grid(parameters.grid, communicator), scene(make_scene(parameters, grid)), stage_scheme(parameters.scheme)
+      stage_scheme(parameters.scheme)
 {
   const bool first = dealii::Utilities::MPI::this_mpi_process(communicator) == 0;
   if (first) {
     std::ofstream prm(directory + "/parameters.prm");
     file.write_prm(prm);
   }
-  outputs = std::make_unique<Outputs>(parameters, options, directory, scene, grid);
+  outputs = std::make_unique<Outputs>(parameters, directory, scene, grid);
   balances = std::make_unique<Balances<dim>>(totals(scene, communicator));
   wall.setup = seconds() - begin;
 }
@@ -158,10 +160,10 @@ void Simulation<dim>::run_stage(const StageParameters &stage, const double start
   const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
   solver = std::make_unique<ExplicitMPM<dim>>(stage_scheme, grid, scene, start, carried);
   solver->prepare();
-  outputs->plan(parameters.output, start, end);
+  outputs->plan(parameters.output, comparison, start, end);
   std::ostringstream message;
-  message << "stage '" << stage.name << "': " << stage.duration << " s, stable step " << solver->stable_step().dt
-          << " s (" << solver->stable_step().limit << ')';
+  message << "stage '" << stage.name << "': " << stage.duration << " s, stable step "
+          << solver->stable_step().dt << " s (" << solver->stable_step().limit << ')';
   log.line(message.str());
   if (steps.n_steps == 0)
     report(now, true);
@@ -176,11 +178,12 @@ void Simulation<dim>::run_stage(const StageParameters &stage, const double start
       stable = solver->stable_step();
       steps_since_check = 0;
     }
-    const double wanted = stage_scheme.fixed_step > 0. ? stage_scheme.fixed_step : stage_scheme.step_factor * stable.dt;
+    const double wanted =
+        stage_scheme.fixed_step > 0. ? stage_scheme.fixed_step : stage_scheme.step_factor * stable.dt;
     if (stage_scheme.fixed_step > stable.dt) {
       std::ostringstream message;
-      message << "'Time step' " << wanted << " s is above the stable step " << stable.dt << " s (" << stable.limit
-              << ") at t = " << now << " s";
+      message << "'Time step' " << wanted << " s is above the stable step " << stable.dt << " s ("
+              << stable.limit << ") at t = " << now << " s";
       throw NumericalError(message.str());
     }
     steps.limit = stable.limit;
@@ -216,15 +219,15 @@ void Simulation<dim>::report(const double time, const bool everything)
   if (outputs->statistics_times.due(time) || everything) {
     const Totals<dim> sums = totals(scene, communicator);
     balances->update(sums, solver->ledger(), communicator);
-    outputs->statistics.write(time, steps.n_steps, steps.n_steps ? solver->fields().dt : 0., steps.limit, sums,
-                              *balances);
+    outputs->statistics.write(time, steps.n_steps, steps.n_steps ? solver->fields().dt : 0., steps.limit,
+                              sums, *balances);
   }
   if (outputs->comparison_times.due(time))
-    outputs->comparison.compare(time, scene, communicator);
+    comparison.compare(time, scene, communicator);
   if (outputs->probes && (outputs->probe_times.due(time) || everything) &&
       !(steps.n_steps > 0 && outputs->probes->time() == time)) {
     outputs->probes->write(time);
-    outputs->comparison.compare(*outputs->probes);
+    comparison.compare(*outputs->probes);
   }
   if (outputs->pictures && (outputs->picture_times.due(time) || everything))
     outputs->pictures->write(time, solver->nodes(), solver->fields());
@@ -233,9 +236,9 @@ void Simulation<dim>::report(const double time, const bool everything)
 template <int dim>
 std::vector<typename Comparison<dim>::Result> Simulation<dim>::compare_with_references() const
 {
-  if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0 && !outputs->comparison.empty())
-    outputs->comparison.write_errors(directory + "/errors.csv");
-  return outputs->comparison.results();
+  if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0 && !comparison.empty())
+    comparison.write_errors(directory + "/errors.csv");
+  return comparison.results();
 }
 
 template class Simulation<2>;

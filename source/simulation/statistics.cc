@@ -8,8 +8,10 @@ Statistics<dim>::Statistics(const std::string &directory, const bool is_first_ra
     return;
   file.open(directory + "/statistics.csv");
   file.precision(15);
-  file << "time [s],step,dt [s],binding limit,mass [kg],kinetic energy [J],elastic energy [J],fluid energy [J],"
-          "external work [J],gravity work [J],seepage dissipation [J],numerical dissipation [J],fluid outflow [m^"
+  file << "time [s],step,dt [s],binding limit,mass [kg],kinetic energy [J],elastic energy [J],fluid energy "
+          "[J],"
+          "external work [J],gravity work [J],seepage dissipation [J],numerical dissipation [J],fluid "
+          "outflow [m^"
        << dim << "],largest speed [m/s]";
   const char axes[] = "xyz";
   for (const std::string quantity : {"momentum", "impulse", "center"})
@@ -19,20 +21,22 @@ Statistics<dim>::Statistics(const std::string &directory, const bool is_first_ra
 }
 
 template <int dim>
-void Statistics<dim>::write(const double time, const unsigned long step, const double dt, const std::string &limit,
-                            const Totals<dim> &totals, const Balances<dim> &balances)
+void Statistics<dim>::write(const double time, const unsigned long step, const double dt,
+                            const std::string &limit, const Totals<dim> &totals,
+                            const Balances<dim> &balances)
 {
   if (!file.is_open())
     return;
   const Ledger<dim> &book = balances.ledger();
-  file << time << ',' << step << ',' << dt << ',' << limit << ',' << totals.mass << ',' << totals.kinetic_energy << ','
-       << totals.elastic_energy << ',' << totals.fluid_energy << ',' << book.external_work << ',' << book.gravity_work
-       << ',' << book.seepage_dissipation << ',' << balances.numerical_dissipation << ',' << book.fluid_outflow << ','
-       << totals.largest_speed;
+  file << time << ',' << step << ',' << dt << ',' << limit << ',' << totals.mass << ','
+       << totals.kinetic_energy << ',' << totals.elastic_energy << ',' << totals.fluid_energy << ','
+       << book.external_work << ',' << book.gravity_work << ',' << book.seepage_dissipation << ','
+       << balances.numerical_dissipation << ',' << book.fluid_outflow << ',' << totals.largest_speed;
   for (const auto &vector : {totals.momentum, book.impulse, totals.center})
     for (unsigned int d = 0; d < dim; ++d)
       file << ',' << vector[d];
-  file << ',' << balances.fluid_error << ',' << balances.momentum_error << ',' << balances.energy_error << std::endl;
+  file << ',' << balances.fluid_error << ',' << balances.momentum_error << ',' << balances.energy_error
+       << std::endl;
 }
 
 template class Statistics<2>;

@@ -10,18 +10,18 @@
 
 namespace peat {
 namespace {
-  double peak_memory(MPI_Comm communicator)
-  {
-    rusage usage;
-    getrusage(RUSAGE_SELF, &usage);
-    return dealii::Utilities::MPI::sum(1024. * usage.ru_maxrss, communicator);
-  }
+double peak_memory(MPI_Comm communicator)
+{
+  rusage usage;
+  getrusage(RUSAGE_SELF, &usage);
+  return dealii::Utilities::MPI::sum(1024. * usage.ru_maxrss, communicator);
+}
 
-  /// JSON knows no NaN.
-  nlohmann::ordered_json number(const double x)
-  {
-    return std::isfinite(x) ? nlohmann::ordered_json(x) : nlohmann::ordered_json(nullptr);
-  }
+/// JSON knows no NaN.
+nlohmann::ordered_json number(const double x)
+{
+  return std::isfinite(x) ? nlohmann::ordered_json(x) : nlohmann::ordered_json(nullptr);
+}
 } // namespace
 
 template <int dim>

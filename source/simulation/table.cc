@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <numeric>
@@ -43,7 +44,7 @@ double read_number(const std::string &text, const Origin &origin, const std::str
 Table::Table(const std::string &file_name)
 {
   std::ifstream file(file_name);
-  if (!file)
+  if (!file || std::filesystem::is_directory(file_name))
     throw InputError("cannot open the table '" + file_name + "'");
   Origin origin{file_name, 0};
   std::string line;

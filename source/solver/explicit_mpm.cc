@@ -37,18 +37,20 @@ Body<dim> &Scene<dim>::body(const std::string &name) const
 template <int dim>
 ExplicitMPM<dim>::ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &scene,
                               const double start_time, const Ledger<dim> &carried)
-    : scheme(scheme), grid(grid), scene(scene), saturated(scene.is_saturated()), has_loads(!scene.surfaces.empty()),
-      active(grid, static_cast<unsigned int>(scheme.basis)), now(start_time), book(carried)
+    : scheme(scheme), grid(grid), scene(scene), saturated(scene.is_saturated()),
+      has_loads(!scene.surfaces.empty()), active(grid, static_cast<unsigned int>(scheme.basis)),
+      now(start_time), book(carried)
 {
   for (const auto &body : scene.bodies) {
     const Material &material = body->material();
     kernels.push_back(Kernels<dim>::make(scheme.basis, material.mixture() != nullptr));
-    filter_rates.push_back(material.mixture() ? scheme.pressure_filter *
-                                                    material.mixture()->undrained_speed(material.initial_modulus()) /
-                                                    grid.smallest_cell_size()
-                                              : 0.);
+    filter_rates.push_back(material.mixture()
+                               ? scheme.pressure_filter *
+                                     material.mixture()->undrained_speed(material.initial_modulus()) /
+                                     grid.smallest_cell_size()
+                               : 0.);
   }
-  nodal.n_sums = saturated ? Sums<dim>::n_saturated : Sums<dim>::n_dry;
+  nodal.n_sums = Sums<dim>::full_momentum(saturated) + (scheme.nodes_keep_velocity ? dim : 0);
 }
 
 template <int dim>
@@ -64,7 +66,7 @@ void ExplicitMPM<dim>::prepare()
   resize_fields();
   if (scheme.nodes_keep_velocity)
     renumber_kept_velocity();
-  steps_to_aggregation = 0;
+  steps_to_reference_masses = 0;
 
   std::vector<bool> open(2 * dim, false);
   for (const auto &condition : scene.conditions) {
@@ -98,82 +100,44 @@ void ExplicitMPM<dim>::resize_fields()
 template <int dim>
 void ExplicitMPM<dim>::renumber_kept_velocity()
 {
-  std::vector<double> velocity(active.size() * dim, 0.);
-  std::vector<char> known(active.size(), false);
+  // Another rank may know what a node had that is new here.
+  constexpr unsigned int n = dim + 1;
+  std::vector<double> kept(active.size() * n, 0.);
   for (std::size_t i = 0; i < active.size(); ++i)
-    if (const std::uint32_t old = active.previous_index(i); old < kept_is_known.size()) {
-      known[i] = kept_is_known[old];
-      for (unsigned int d = 0; d < dim; ++d)
-        velocity[i * dim + d] = kept_velocity[std::size_t(old) * dim + d];
-    }
-  kept_velocity.swap(velocity);
-  kept_is_known.swap(known);
+    if (const std::uint32_t old = active.previous_index(i); old != no_index && !kept_velocity.empty())
+      std::copy_n(&kept_velocity[std::size_t(old) * n], n, &kept[i * n]);
+  active.sum_over_ranks(kept.data(), n);
+  for (std::size_t i = 0; i < active.size(); ++i)
+    for (unsigned int d = 0; d < n; ++d)
+      kept[i * n + d] /= std::max(1., kept[i * n + dim]);
+  for (std::size_t i = 0; i < active.size(); ++i)
+    kept[i * n + dim] = kept[i * n + dim] > 0. ? 1. : 0.;
+  kept_velocity.swap(kept);
 }
 
 template <int dim>
-void ExplicitMPM<dim>::complete_kept_velocity()
+void ExplicitMPM<dim>::find_reference_masses()
 {
-  constexpr unsigned int n = dim + 1;
-  std::vector<double> values(active.size() * n, 0.);
-  const auto take_over = [&]() {
-    active.sum_over_ranks(values.data(), n);
-    for (std::size_t i = 0; i < active.size(); ++i)
-      if (const double weight = values[i * n + dim]; weight > 0.) {
-        kept_is_known[i] = true;
-        for (unsigned int d = 0; d < dim; ++d)
-          kept_velocity[i * dim + d] = values[i * n + d] / weight;
-      }
-  };
-  // What any rank knows.
-  for (std::size_t i = 0; i < active.size(); ++i)
-    if (kept_is_known[i]) {
-      for (unsigned int d = 0; d < dim; ++d)
-        values[i * n + d] = kept_velocity[i * dim + d];
-      values[i * n + dim] = 1.;
-    }
-  take_over();
-
-  // Others begin with the mean of their cells' nodes that have one.
-  const std::vector<char> known = kept_is_known;
-  std::fill(values.begin(), values.end(), 0.);
+  if (steps_to_reference_masses-- > 0)
+    return;
+  steps_to_reference_masses = 100;
+  reference_mass.assign(active.size(), 0.);
   for (const CellId cell : active.occupied_cells()) {
     const std::uint32_t *cell_nodes = active.cell_nodes(cell);
-    for (unsigned int k = 0; k < active.nodes_per_cell(); ++k)
-      for (unsigned int j = 0; j < active.nodes_per_cell() && !known[cell_nodes[k]]; ++j)
-        if (known[cell_nodes[j]]) {
-          for (unsigned int d = 0; d < dim; ++d)
-            values[cell_nodes[k] * n + d] += kept_velocity[std::size_t(cell_nodes[j]) * dim + d];
-          values[cell_nodes[k] * n + dim] += 1.;
-        }
+    double heaviest = 0.;
+    for (unsigned int v = 0; v < (1u << dim); ++v)
+      heaviest = std::max(heaviest, nodal.sums[std::size_t(cell_nodes[active.own_node(v)]) * nodal.n_sums]);
+    for (unsigned int i = 0; i < active.nodes_per_cell(); ++i)
+      reference_mass[cell_nodes[i]] = std::max(reference_mass[cell_nodes[i]], heaviest);
   }
-  take_over();
+  active.max_over_ranks(reference_mass.data(), 1);
 }
 
 template <int dim>
-double ExplicitMPM<dim>::fastest_on_any_rank() const
+bool ExplicitMPM<dim>::is_small(const std::size_t node) const
 {
-  return dealii::Utilities::MPI::max(findings.largest_speed, grid.communicator());
-}
-
-template <int dim>
-void ExplicitMPM<dim>::aggregate_small_nodes()
-{
-  if (steps_to_aggregation > 0) {
-    --steps_to_aggregation;
-    return;
-  }
-  // Share of the mass of a cell's heaviest node: below that of the corner of a body that fills its cells, 1/8 in 3-D.
-  constexpr double smallest_share = 0.1;
-  active.separate();
-  if (scheme.nodes_keep_velocity)
-    complete_kept_velocity();
-  points_to_nodes();
-  active.aggregate(&nodal.sums[Sums<dim>::mass], nodal.n_sums, smallest_share);
-
-  // Look again when points may have moved by a fiftieth of a cell.
-  const double path = fastest_on_any_rank() * nodal.dt;
-  const double n_steps = path > 0. ? 0.02 * grid.smallest_cell_size() / path : 100.;
-  steps_to_aggregation = std::max(0., std::min(99., n_steps - 1.));
+  // Nodes on a face of a body that fills its cells have half of it, those on its edges and corners less.
+  return nodal.sums[node * nodal.n_sums + Sums<dim>::mass] < 0.4 * reference_mass[node];
 }
 
 template <int dim>
@@ -181,9 +145,9 @@ void ExplicitMPM<dim>::step(const double dt)
 {
   nodal.time = now;
   nodal.dt = dt;
-  aggregate_small_nodes();
   points_to_nodes();
   add_loads();
+  find_velocities();
   solve_momentum();
   constrain_motion();
   solve_darcy();
@@ -237,6 +201,48 @@ void ExplicitMPM<dim>::add_loads()
 }
 
 template <int dim>
+void ExplicitMPM<dim>::find_velocities()
+{
+  using S = Sums<dim>;
+  if (scheme.nodes_keep_velocity)
+    find_reference_masses();
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    const double *sum = &nodal.sums[i * nodal.n_sums];
+    const double inverse = sum[S::mass] > 0. ? 1. / sum[S::mass] : 0.;
+    // A node with little mass may have had a large acceleration: it takes its velocity from the points alone.
+    const bool keeps = scheme.nodes_keep_velocity && kept_velocity[i * (dim + 1) + dim] > 0. && !is_small(i);
+    const double *momentum =
+        sum + (scheme.nodes_keep_velocity && !keeps ? S::full_momentum(saturated) : S::momentum);
+    for (unsigned int d = 0; d < dim; ++d)
+      nodal.velocity[i * dim + d] = momentum[d] * inverse + (keeps ? kept_velocity[i * (dim + 1) + d] : 0.);
+  }
+}
+
+template <int dim>
+void ExplicitMPM<dim>::keep_velocities()
+{
+  // What nodes keep is exact while points stay where they are in their cells. It fades with the way they go,
+  // to what the points alone would give: a share exp(-20) is left after a cell. Without this, and with more
+  // nodes that keep their velocity, a turning block gains energy (S5, rigid motion).
+  const double fading = 20. * nodal.dt / grid.smallest_cell_size();
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    const double *sum = &nodal.sums[i * nodal.n_sums];
+    const double *momentum = sum + Sums<dim>::full_momentum(saturated);
+    const double inverse = sum[Sums<dim>::mass] > 0. ? 1. / sum[Sums<dim>::mass] : 0.;
+    double speed = 0.;
+    for (unsigned int d = 0; d < dim; ++d)
+      speed += std::abs(nodal.velocity[i * dim + d]);
+    const double share = std::exp(-fading * speed);
+    double *kept = &kept_velocity[i * (dim + 1)];
+    kept[dim] = is_small(i) || sum[Sums<dim>::mass] == 0. ? 0. : 1.;
+    for (unsigned int d = 0; d < dim; ++d) {
+      const double from_points = momentum[d] * inverse;
+      kept[d] = kept[dim] * (from_points + share * (nodal.new_velocity[i * dim + d] - from_points));
+    }
+  }
+}
+
+template <int dim>
 void ExplicitMPM<dim>::solve_momentum()
 {
   using S = Sums<dim>;
@@ -246,11 +252,11 @@ void ExplicitMPM<dim>::solve_momentum()
     const double inverse = m > 0. ? 1. / m : 0.;
     for (unsigned int d = 0; d < dim; ++d) {
       const std::size_t row = i * dim + d;
-      const double v = sum[S::momentum + d] * inverse + (scheme.nodes_keep_velocity ? kept_velocity[row] : 0.);
-      double a = (sum[S::force + d] + (has_loads ? nodal.force[row] : 0.)) * inverse + gravity_now[d] * (m > 0.);
+      const double v = nodal.velocity[row];
+      double a =
+          (sum[S::force + d] + (has_loads ? nodal.force[row] : 0.)) * inverse + gravity_now[d] * (m > 0.);
       if (scheme.local_damping > 0.)
         a -= scheme.local_damping * std::copysign(a, v) * (v != 0.);
-      nodal.velocity[row] = v;
       nodal.acceleration[row] = a;
       nodal.new_velocity[row] = v + nodal.dt * a;
     }
@@ -271,7 +277,8 @@ dealii::Tensor<1, dim> ExplicitMPM<dim>::total_momentum() const
 template <int dim>
 void ExplicitMPM<dim>::constrain_motion()
 {
-  // Only where points take the grid's velocity does a node's prescribed velocity change their momentum at once.
+  // Only where points take the grid's velocity does a node's prescribed velocity change their momentum at
+  // once.
   const double share = 1. - scheme.retention(nodal.dt);
   const auto before = share > 0. ? total_momentum() : dealii::Tensor<1, dim>();
   for (const auto &condition : scene.conditions)
@@ -309,11 +316,8 @@ void ExplicitMPM<dim>::nodes_to_points()
   findings = {};
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
   const double *v = nodal.new_velocity.data(), *a = nodal.acceleration.data(), *w = nodal.flux.data();
-  if (scheme.nodes_keep_velocity) {
-    kept_velocity = nodal.new_velocity;
-    for (std::size_t i = 0; i < active.size(); ++i)
-      kept_is_known[i] = nodal.sums[i * nodal.n_sums + Sums<dim>::mass] > 0.;
-  }
+  if (scheme.nodes_keep_velocity)
+    keep_velocities();
   if (scheme.stress_update == SchemeParameters::StressUpdate::last) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b)
       kernels[b]->advance_and_deform(*scene.bodies[b], active, a, v, w, update, pressure_update(b), findings);
@@ -331,7 +335,8 @@ void ExplicitMPM<dim>::nodes_to_points()
   for (const auto &condition : scene.conditions)
     condition->constrain_velocity(active, now + nodal.dt, nodal.dt, carrying_velocity);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    kernels[b]->deform(*scene.bodies[b], active, carrying_velocity.data(), w, nodal.dt, pressure_update(b), findings);
+    kernels[b]->deform(*scene.bodies[b], active, carrying_velocity.data(), w, nodal.dt, pressure_update(b),
+                       findings);
 }
 
 template <int dim>
@@ -384,14 +389,7 @@ template <int dim>
 void ExplicitMPM<dim>::relocate_points()
 {
   // What any rank finds concerns all: a change of cells or ranks is collective, and so is the end of a run.
-  enum
-  {
-    not_finite,
-    error,
-    cells_changed,
-    leaves_rank,
-    n_flags
-  };
+  enum { not_finite, error, cells_changed, leaves_rank, n_flags };
   std::array<int, n_flags> flags = {!findings.finite, 0, 0, 0};
   std::string message;
   try {

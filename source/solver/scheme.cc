@@ -5,36 +5,48 @@
 namespace peat {
 SchemeParameters::SchemeParameters(Section section)
 {
-  std::string basis_name = "gimp", transfer = "dflip", update = "usl";
-  section.add("Basis", basis_name, {"q1", "gimp"},
-              "Shape functions of the points. 'q1': FE_Q(1), cheapest, for points that stay in their cells. 'gimp': "
-              "FE_Q(1) averaged over the point's domain, ten to a hundred times less noise when points cross faces.");
-  section.add("Transfer", transfer, {"dflip", "flip", "pic"},
-              "How velocities go from points to nodes and back. 'flip': points add the grid's acceleration. 'dflip': the "
-              "same, but nodes keep their velocity and take up only how the points differ from it, which removes the "
-              "dispersion of FLIP. 'pic': points take the grid's velocity; damps strongly.");
-  section.add("Stress update", update, {"usl", "musl"},
-              "When stresses follow the velocities. 'usl': from the nodes' new velocities, cheapest. 'musl': from the "
-              "points' new velocities mapped back to the nodes, for 'q1' where bodies' edges cut through cells.");
+  std::string basis_name = "gimp", transfer = "dflip", update = "auto";
+  section.add(
+      "Basis", basis_name, {"q1", "gimp"},
+      "Shape functions of the points. 'q1': FE_Q(1), cheapest, for points that stay in their cells. 'gimp': "
+      "FE_Q(1) averaged over the point's domain, ten to a hundred times less noise when points cross faces.");
+  section.add(
+      "Transfer", transfer, {"dflip", "flip", "pic"},
+      "How velocities go from points to nodes and back. 'flip': points add the grid's acceleration. 'dflip': "
+      "the "
+      "same, but nodes keep their velocity and take up only how the points differ from it, which removes the "
+      "dispersion of FLIP. 'pic': points take the grid's velocity; damps strongly.");
+  section.add("Stress update", update, {"auto", "usl", "musl"},
+              "When stresses follow the velocities. 'usl': from the nodes' new velocities, cheapest. 'musl': "
+              "from the "
+              "points' new velocities mapped back to the nodes, which 'q1' needs as soon as points leave a "
+              "body's first "
+              "cells. 'auto': usl with gimp, musl with q1.");
   section.add("Relaxation time", relaxation_time, nonnegative("s"),
-              "Time in which the points' velocities relax to the grid's in 'flip' and 'dflip'; damps noise at a rate that "
+              "Time in which the points' velocities relax to the grid's in 'flip' and 'dflip'; damps noise "
+              "at a rate that "
               "does not depend on the step. 0: never.");
   section.add("Local damping", local_damping, between(0., 0.99),
-              "Share of each node's out-of-balance force that acts against its velocity; for dynamic relaxation to rest.");
+              "Share of each node's out-of-balance force that acts against its velocity; for dynamic "
+              "relaxation to rest.");
   std::string pressure = "cell";
-  section.add("Pressure", pressure, {"cell", "point"},
-              "How pore pressure acts. 'cell': with its mean over the points of a cell, and following the mean rate there; "
-              "does not lock. 'point': each point on its own; locks in 2-D and 3-D with more than one point a cell.");
+  section.add(
+      "Pressure", pressure, {"cell", "point"},
+      "How pore pressure acts. 'cell': with its mean over the points of a cell, and following the mean rate "
+      "there; "
+      "does not lock. 'point': each point on its own; locks in 2-D and 3-D with more than one point a cell.");
   pressure_of_cells = pressure == "cell";
   section.add("Pressure filter", pressure_filter, nonnegative(""),
-              "Rate, in units of c_u/h, at which pore pressures of points go to the mean of their cell; conserves the "
+              "Rate, in units of c_u/h, at which pore pressures of points go to the mean of their cell; "
+              "conserves the "
               "fluid's volume.");
   section.add("Step factor", step_factor, strictly_between(0., 100.), "Step over the stable step.");
   section.add("Time step", fixed_step, nonnegative("s"), "A fixed step; 0 for the automatic one.");
   basis = basis_name == "q1" ? Basis::q1 : Basis::gimp;
   nodes_keep_velocity = transfer == "dflip";
   grid_velocity = transfer == "pic";
-  stress_update = update == "usl" ? StressUpdate::last : StressUpdate::modified_last;
+  stress_update = update == "usl" || (update == "auto" && basis == Basis::gimp) ? StressUpdate::last
+                                                                                : StressUpdate::modified_last;
 }
 
 double SchemeParameters::retention(const double dt) const

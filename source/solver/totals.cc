@@ -6,47 +6,47 @@
 
 namespace peat {
 namespace {
-  template <int dim>
-  void add(const Body<dim> &body, Totals<dim> &sum)
-  {
-    const Layout &layout = body.layout();
-    const Law &law = body.material().law();
-    const Mixture *mixture = body.material().mixture();
-    constexpr unsigned int n_stress = dim == 2 ? 4 : 6;
-    const std::uint32_t n = body.n_local_points();
-    for (std::uint32_t begin = 0; begin < n; begin += n_lanes) {
-      StressLanes stress = {};
-      Lanes state[max_state_columns] = {};
-      for (unsigned int l = 0; l < n_lanes; ++l) {
-        const double *row = body.row(std::min(begin + l, n - 1));
-        for (unsigned int c = 0; c < n_stress; ++c)
-          stress[c][l] = row[layout.stress + c];
-        for (unsigned int c = 0; c < layout.n_state; ++c)
-          state[c][l] = row[layout.state + c];
+template <int dim>
+void add(const Body<dim> &body, Totals<dim> &sum)
+{
+  const Layout &layout = body.layout();
+  const Law &law = body.material().law();
+  const Mixture *mixture = body.material().mixture();
+  constexpr unsigned int n_stress = dim == 2 ? 4 : 6;
+  const std::uint32_t n = body.n_local_points();
+  for (std::uint32_t begin = 0; begin < n; begin += n_lanes) {
+    StressLanes stress = {};
+    Lanes state[max_state_columns] = {};
+    for (unsigned int l = 0; l < n_lanes; ++l) {
+      const double *row = body.row(std::min(begin + l, n - 1));
+      for (unsigned int c = 0; c < n_stress; ++c)
+        stress[c][l] = row[layout.stress + c];
+      for (unsigned int c = 0; c < layout.n_state; ++c)
+        state[c][l] = row[layout.state + c];
+    }
+    const Lanes psi = law.stored_energy(stress, state);
+    for (unsigned int l = 0; l < n_lanes && begin + l < n; ++l) {
+      const double *row = body.row(begin + l);
+      const double m = row[layout.mass], V = row[layout.volume];
+      double v2 = 0.;
+      for (unsigned int d = 0; d < dim; ++d) {
+        v2 += row[layout.velocity + d] * row[layout.velocity + d];
+        sum.momentum[d] += m * row[layout.velocity + d];
+        sum.center[d] += m * body.position(begin + l)[d];
       }
-      const Lanes psi = law.stored_energy(stress, state);
-      for (unsigned int l = 0; l < n_lanes && begin + l < n; ++l) {
-        const double *row = body.row(begin + l);
-        const double m = row[layout.mass], V = row[layout.volume];
-        double v2 = 0.;
-        for (unsigned int d = 0; d < dim; ++d) {
-          v2 += row[layout.velocity + d] * row[layout.velocity + d];
-          sum.momentum[d] += m * row[layout.velocity + d];
-          sum.center[d] += m * body.position(begin + l)[d];
-        }
-        sum.mass += m;
-        sum.kinetic_energy += 0.5 * m * v2;
-        sum.elastic_energy += V * psi[l];
-        sum.largest_speed = std::max(sum.largest_speed, std::sqrt(v2));
-        if (mixture) {
-          const double porosity = layout.porosity >= 0 ? row[layout.porosity] : mixture->porosity();
-          const double content = V * row[layout.pressure] * mixture->storage(broadcast(porosity))[0];
-          sum.fluid_volume += V * porosity + content;
-          sum.fluid_energy += 0.5 * content * row[layout.pressure];
-        }
+      sum.mass += m;
+      sum.kinetic_energy += 0.5 * m * v2;
+      sum.elastic_energy += V * psi[l];
+      sum.largest_speed = std::max(sum.largest_speed, std::sqrt(v2));
+      if (mixture) {
+        const double porosity = layout.porosity >= 0 ? row[layout.porosity] : mixture->porosity();
+        const double content = V * row[layout.pressure] * mixture->storage(broadcast(porosity))[0];
+        sum.fluid_volume += V * porosity + content;
+        sum.fluid_energy += 0.5 * content * row[layout.pressure];
       }
     }
   }
+}
 } // namespace
 
 template <int dim>
@@ -55,7 +55,8 @@ Totals<dim> totals(const Scene<dim> &scene, MPI_Comm communicator)
   Totals<dim> sum;
   for (const auto &body : scene.bodies)
     add(*body, sum);
-  std::vector<double> values = {sum.mass, sum.fluid_volume, sum.kinetic_energy, sum.elastic_energy, sum.fluid_energy};
+  std::vector<double> values = {sum.mass, sum.fluid_volume, sum.kinetic_energy, sum.elastic_energy,
+                                sum.fluid_energy};
   for (unsigned int d = 0; d < dim; ++d) {
     values.push_back(sum.momentum[d]);
     values.push_back(sum.center[d]);
@@ -98,13 +99,15 @@ void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MP
     fluid_error = std::max(fluid_error, std::abs(now.fluid_volume - start.fluid_volume + book.fluid_outflow +
                                                  book.fluid_squeezed) /
                                             start.fluid_volume);
-  momentum_scale = std::max({momentum_scale, book.gross_impulse, start.momentum.norm(), now.mass * now.largest_speed});
+  momentum_scale =
+      std::max({momentum_scale, book.gross_impulse, start.momentum.norm(), now.mass * now.largest_speed});
   if (momentum_scale > 0.)
-    momentum_error = std::max(momentum_error, (now.momentum - start.momentum - book.impulse).norm() / momentum_scale);
+    momentum_error =
+        std::max(momentum_error, (now.momentum - start.momentum - book.impulse).norm() / momentum_scale);
 
   numerical_dissipation = start.energy() + book.external_work + book.seepage_work - now.energy();
-  energy_scale = std::max({energy_scale, now.energy(), start.energy(), std::abs(book.external_work),
-                           book.seepage_dissipation});
+  energy_scale = std::max(
+      {energy_scale, now.energy(), start.energy(), std::abs(book.external_work), book.seepage_dissipation});
   if (energy_scale > 0.)
     energy_error = std::abs(numerical_dissipation) / energy_scale;
 }

@@ -4,32 +4,33 @@
 
 namespace peat {
 namespace {
-  /// Pore fluid quantities of a batch at its present porosity.
-  struct FluidLanes
-  {
-    Lanes Q;
-    Lanes kappa;
-  };
+/// Pore fluid quantities of a batch at its present porosity.
+struct FluidLanes
+{
+  Lanes Q;
+  Lanes kappa;
+};
 
-  FluidLanes fluid_at_start(const Mixture *mixture)
-  {
-    return mixture ? FluidLanes{broadcast(mixture->Q()), broadcast(mixture->mobility())} : FluidLanes{};
-  }
+FluidLanes fluid_at_start(const Mixture *mixture)
+{
+  return mixture ? FluidLanes{broadcast(mixture->Q()), broadcast(mixture->mobility())} : FluidLanes{};
+}
 
-  template <typename Batch>
-  FluidLanes fluid(const Mixture &mixture, const Layout &layout, const Batch &batch, const FluidLanes &at_start)
-  {
-    if (layout.porosity < 0)
-      return at_start;
-    const Lanes n = batch.load(layout.porosity);
-    return {1. / mixture.storage(n), mixture.mobility(n)};
-  }
+template <typename Batch>
+FluidLanes fluid(const Mixture &mixture, const Layout &layout, const Batch &batch, const FluidLanes &at_start)
+{
+  if (layout.porosity < 0)
+    return at_start;
+  const Lanes n = batch.load(layout.porosity);
+  return {1. / mixture.storage(n), mixture.mobility(n)};
+}
 
-  Lanes determinant_of_step(const GradientLanes &du)
-  {
-    const Lanes f0 = 1. + du[0], f4 = 1. + du[4], f8 = 1. + du[8];
-    return f0 * (f4 * f8 - du[5] * du[7]) - du[1] * (du[3] * f8 - du[5] * du[6]) + du[2] * (du[3] * du[7] - f4 * du[6]);
-  }
+Lanes determinant_of_step(const GradientLanes &du)
+{
+  const Lanes f0 = 1. + du[0], f4 = 1. + du[4], f8 = 1. + du[8];
+  return f0 * (f4 * f8 - du[5] * du[7]) - du[1] * (du[3] * f8 - du[5] * du[6]) +
+         du[2] * (du[3] * du[7] - f4 * du[6]);
+}
 } // namespace
 
 template <int dim, unsigned int reach, bool saturated>
@@ -51,7 +52,8 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
                                                   double *sums, const unsigned int stride) const
 {
   using S = Sums<dim>;
-  constexpr unsigned int n_sums = saturated ? S::n_saturated : S::n_dry;
+  constexpr unsigned int full = S::full_momentum(saturated), n_sums = full + dim;
+  const unsigned int n_used = kept ? n_sums : full;
   const Layout &layout = body.layout();
   const Mixture *mixture = body.material().mixture();
   const FluidLanes at_start = fluid_at_start(mixture);
@@ -60,14 +62,14 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
   std::array<Lanes, dim> x;
   Weights<dim, reach> lane_weights;
   // Per point: what the node vectors are multiplied with.
-  alignas(64) double momentum[dim][n_lanes], total_stress[6][n_lanes], darcy[3][n_lanes];
-  alignas(64) double local_kept[dim][Chunks::n_nodes];
+  alignas(64) double momentum[2 * dim][n_lanes], total_stress[6][n_lanes], darcy[3][n_lanes];
+  alignas(64) double local_kept[dim + 1][Chunks::n_nodes];
 
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     if (kept)
-      gather(kept, cell_nodes, local_kept);
+      gather<dim + 1>(kept, cell_nodes, local_kept);
     alignas(64) NodeLanes local[n_sums][Chunks::n] = {};
     const double mean_p = saturated && pressure.cell_means ? mean_pressure(body, slice) : 0.;
 
@@ -76,11 +78,15 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
       evaluate(body, batch, cell, x, lane_weights);
       const PointwiseWeights<dim, reach> w(lane_weights);
       const Lanes m = batch.load(layout.mass);
+      const Lanes keeping = kept ? interpolate<dim, reach>(local_kept[dim], lane_weights) : broadcast(1.);
       for (unsigned int d = 0; d < dim; ++d) {
-        Lanes v = batch.load(layout.velocity + d);
+        const Lanes v = batch.load(layout.velocity + d);
+        Lanes difference = v;
         if (kept)
-          v -= interpolate<dim, reach>(local_kept[d], lane_weights);
-        reinterpret_cast<Lanes &>(momentum[d]) = m * v;
+          difference = keeping > 1e-3 ? v - interpolate<dim, reach>(local_kept[d], lane_weights) / keeping
+                                      : broadcast(0.);
+        reinterpret_cast<Lanes &>(momentum[d]) = m * difference;
+        reinterpret_cast<Lanes &>(momentum[dim + d]) = m * v;
       }
       const Lanes V = batch.load(layout.volume);
       Lanes alpha_p = broadcast(0.);
@@ -106,6 +112,9 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
           sum[S::mass] += m[l] * shape.N;
           for (unsigned int d = 0; d < dim; ++d)
             sum[S::momentum + d] += momentum[d][l] * shape.N;
+          if (kept)
+            for (unsigned int d = 0; d < dim; ++d)
+              sum[full + d] += momentum[dim + d][l] * shape.N;
           if constexpr (dim == 2) {
             sum[S::force] -= total_stress[0][l] * shape.dN[0] + total_stress[3][l] * shape.dN[1];
             sum[S::force + 1] -= total_stress[3][l] * shape.dN[0] + total_stress[1][l] * shape.dN[1];
@@ -131,7 +140,7 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
 
     for (unsigned int i = 0; i < Chunks::n_nodes; ++i) {
       double *out = sums + std::size_t(cell_nodes[i]) * stride;
-      for (unsigned int c = 0; c < n_sums; ++c)
+      for (unsigned int c = 0; c < n_used; ++c)
         out[c] += local[c][i / Chunks::width][i % Chunks::width];
     }
   }
@@ -139,11 +148,11 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
 
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::advance(const Body<dim> &body, const Batch<double> &batch,
-                                                          const Weights<dim, reach> &w,
-                                                          const double (*a)[Chunks::n_nodes],
-                                                          const double (*v)[Chunks::n_nodes],
-                                                          const VelocityUpdate &update,
-                                                          std::array<Lanes, dim> &new_velocity)
+                                                  const Weights<dim, reach> &w,
+                                                  const double (*a)[Chunks::n_nodes],
+                                                  const double (*v)[Chunks::n_nodes],
+                                                  const VelocityUpdate &update,
+                                                  std::array<Lanes, dim> &new_velocity)
 {
   const int column = body.layout().velocity;
   for (unsigned int d = 0; d < dim; ++d) {
@@ -159,9 +168,9 @@ void PointKernels<dim, reach, saturated>::advance(const Body<dim> &body, const B
 
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes,
-                                                                    const double *a, const double *v,
-                                                                    const VelocityUpdate &update,
-                                                                    double *momentum) const
+                                                            const double *a, const double *v,
+                                                            const VelocityUpdate &update,
+                                                            double *momentum) const
 {
   const Layout &layout = body.layout();
   Batch<double> batch;
@@ -206,7 +215,7 @@ Lanes PointKernels<dim, reach, saturated>::volumes(const Layout &layout, const B
 
 template <int dim, unsigned int reach, bool saturated>
 Lanes PointKernels<dim, reach, saturated>::divergence_of(const Weights<dim, reach> &weights,
-                                                           const double (*w)[Chunks::n_nodes])
+                                                         const double (*w)[Chunks::n_nodes])
 {
   Lanes divergence = broadcast(0.);
   for (unsigned int d = 0; d < dim; ++d)
@@ -274,9 +283,9 @@ void PointKernels<dim, reach, saturated>::deform_batch(
   if constexpr (saturated) {
     const Mixture &mixture = *body.material().mixture();
     const Divergences div = cell_mean ? *cell_mean : Divergences{divergence, divergence_of(weights, w)};
-    const Lanes Q = layout.porosity < 0 ? broadcast(mixture.Q()) : 1. / mixture.storage(batch.load(layout.porosity));
-    const Lanes p =
-        batch.load(layout.pressure) - dt * Q * (div.w + mixture.biot_coefficient() * div.v);
+    const Lanes Q =
+        layout.porosity < 0 ? broadcast(mixture.Q()) : 1. / mixture.storage(batch.load(layout.porosity));
+    const Lanes p = batch.load(layout.pressure) - dt * Q * (div.w + mixture.biot_coefficient() * div.v);
     batch.store(layout.pressure, p);
     check += p;
 
@@ -323,7 +332,7 @@ void PointKernels<dim, reach, saturated>::deform_batch(
 
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::filter_pressure(Body<dim> &body, const Slice &slice,
-                                                                  const double share)
+                                                          const double share)
 {
   const Layout &layout = body.layout();
   const Mixture &mixture = *body.material().mixture();
@@ -347,9 +356,8 @@ void PointKernels<dim, reach, saturated>::filter_pressure(Body<dim> &body, const
 
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
-                                                         const double *v, const double *w, const double dt,
-                                                         const PressureUpdate &pressure,
-                                                         StepFindings &findings) const
+                                                 const double *v, const double *w, const double dt,
+                                                 const PressureUpdate &pressure, StepFindings &findings) const
 {
   Batch<double> batch;
   std::array<Lanes, dim> x;
@@ -377,14 +385,17 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
 }
 
 template <int dim, unsigned int reach, bool saturated>
-void PointKernels<dim, reach, saturated>::advance_and_deform(
-    Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v, const double *w,
-    const VelocityUpdate &update, const PressureUpdate &pressure, StepFindings &findings) const
+void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
+                                                             const double *a, const double *v,
+                                                             const double *w, const VelocityUpdate &update,
+                                                             const PressureUpdate &pressure,
+                                                             StepFindings &findings) const
 {
   Batch<double> batch;
   std::array<Lanes, dim> x, velocity;
   Weights<dim, reach> weights;
-  alignas(64) double local_a[dim][Chunks::n_nodes], local_v[dim][Chunks::n_nodes], local_w[dim][Chunks::n_nodes];
+  alignas(64) double local_a[dim][Chunks::n_nodes], local_v[dim][Chunks::n_nodes],
+      local_w[dim][Chunks::n_nodes];
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
@@ -401,7 +412,8 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, weights);
       advance(body, batch, weights, local_a, local_v, update, velocity);
-      deform_batch(body, batch, cell, x, weights, local_v, local_w, update.dt, averaged ? &mean : nullptr, findings);
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, update.dt, averaged ? &mean : nullptr,
+                   findings);
     }
     if (saturated && pressure.filter > 0.)
       filter_pressure(body, slice, pressure.filter);
@@ -409,13 +421,13 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(
 }
 
 namespace {
-  template <int dim, unsigned int reach>
-  std::unique_ptr<Kernels<dim>> make_for(const bool saturated)
-  {
-    if (saturated)
-      return std::make_unique<PointKernels<dim, reach, true>>();
-    return std::make_unique<PointKernels<dim, reach, false>>();
-  }
+template <int dim, unsigned int reach>
+std::unique_ptr<Kernels<dim>> make_for(const bool saturated)
+{
+  if (saturated)
+    return std::make_unique<PointKernels<dim, reach, true>>();
+  return std::make_unique<PointKernels<dim, reach, false>>();
+}
 } // namespace
 
 template <int dim>

@@ -14,8 +14,8 @@ public:
                const PressureUpdate &pressure, double *sums, const unsigned int stride) const override;
   void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
                          const VelocityUpdate &update, double *momentum) const override;
-  void deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *v, const double *w, const double dt,
-              const PressureUpdate &pressure, StepFindings &findings) const override;
+  void deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *v, const double *w,
+              const double dt, const PressureUpdate &pressure, StepFindings &findings) const override;
   void advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
                           const double *w, const VelocityUpdate &update, const PressureUpdate &pressure,
                           StepFindings &findings) const override;
@@ -69,8 +69,9 @@ private:
   }
 
   template <typename Row>
-  static void evaluate(const Body<dim> &body, const Batch<Row> &batch, const std::array<CellInterval, dim> &cell,
-                       std::array<Lanes, dim> &x, Weights<dim, reach> &w)
+  static void evaluate(const Body<dim> &body, const Batch<Row> &batch,
+                       const std::array<CellInterval, dim> &cell, std::array<Lanes, dim> &x,
+                       Weights<dim, reach> &w)
   {
     for (unsigned int d = 0; d < dim; ++d) {
       x[d] = batch.load_position(body, d);
@@ -78,12 +79,13 @@ private:
     }
   }
 
-  /// Copy dim nodal components of a cell's nodes: [component][node].
+  /// Copy the nodal components of a cell's nodes: [component][node].
+  template <unsigned int n_components = dim>
   static void gather(const double *field, const std::uint32_t *cell_nodes, double (*local)[Chunks::n_nodes])
   {
     for (unsigned int i = 0; i < Chunks::n_nodes; ++i)
-      for (unsigned int d = 0; d < dim; ++d)
-        local[d][i] = field[std::size_t(cell_nodes[i]) * dim + d];
+      for (unsigned int c = 0; c < n_components; ++c)
+        local[c][i] = field[std::size_t(cell_nodes[i]) * n_components + c];
   }
 
   static void advance(const Body<dim> &body, const Batch<double> &batch, const Weights<dim, reach> &w,
@@ -97,15 +99,16 @@ private:
     Lanes w;
   };
 
-  static void deform_batch(Body<dim> &body, const Batch<double> &batch, const std::array<CellInterval, dim> &cell,
-                           const std::array<Lanes, dim> &x, const Weights<dim, reach> &weights,
-                           const double (*v)[Chunks::n_nodes], const double (*w)[Chunks::n_nodes], const double dt,
-                           const Divergences *cell_mean, StepFindings &findings);
+  static void deform_batch(Body<dim> &body, const Batch<double> &batch,
+                           const std::array<CellInterval, dim> &cell, const std::array<Lanes, dim> &x,
+                           const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
+                           const double (*w)[Chunks::n_nodes], const double dt, const Divergences *cell_mean,
+                           StepFindings &findings);
 
   /// Volume-weighted means over the points of a cell, the same in all lanes.
   static Divergences mean_divergences(const Body<dim> &body, const Slice &slice,
-                                      const std::array<CellInterval, dim> &cell, const double (*v)[Chunks::n_nodes],
-                                      const double (*w)[Chunks::n_nodes]);
+                                      const std::array<CellInterval, dim> &cell,
+                                      const double (*v)[Chunks::n_nodes], const double (*w)[Chunks::n_nodes]);
   /// Zero in lanes without a point.
   template <typename Row>
   static Lanes volumes(const Layout &layout, const Batch<Row> &batch);

@@ -2,8 +2,8 @@
 
 #include <peat/transfer/kernels.h>
 
-// Points to nodes. The sums of a cell are kept in registers, one lane a node, while its points are visited one by one:
-// with 4, 8, 16 or 64 nodes a cell this needs no reduction over lanes at the end.
+// Points to nodes. The sums of a cell are kept in registers, one lane a node, while its points are visited
+// one by one: with 4, 8, 16 or 64 nodes a cell this needs no reduction over lanes at the end.
 
 namespace peat {
 /// A register (or two, or four) of as many doubles.
@@ -96,9 +96,11 @@ struct ShapeAtNodes
   }
 
   /// The values alone, where no gradient is needed.
-  static Vector value(const PointwiseWeights<dim, reach> &w, const unsigned int point, const unsigned int chunk)
+  static Vector value(const PointwiseWeights<dim, reach> &w, const unsigned int point,
+                      const unsigned int chunk)
   {
-    Vector product = Chunks::spread(w.value[0][point], 0, chunk) * Chunks::spread(w.value[1][point], 1, chunk);
+    Vector product =
+        Chunks::spread(w.value[0][point], 0, chunk) * Chunks::spread(w.value[1][point], 1, chunk);
     if constexpr (dim == 3)
       product *= Chunks::spread(w.value[2][point], 2, chunk);
     return product;

@@ -86,7 +86,8 @@ BOOST_AUTO_TEST_CASE(unknown_fields)
   const Directory directory;
   const auto reference = [](const std::string &lines) {
     return message_of([&] {
-      World<2> world(2, "subsection References\n  subsection check\n" + lines + "\n  end\nend\n");
+      World<2> world(2,
+                     "subsection References\n  subsection check\nset Value = 0\n" + lines + "\n  end\nend\n");
       Comparison<2> comparison(*world.parameters, ".");
     });
   };

@@ -14,17 +14,18 @@ struct Origin
   std::string prefix() const;
 };
 
-/// The user's input is wrong. what() is one line that names the place, the user's word and what would be right.
-/// The program ends with exit code 1.
+/// The user's input is wrong. what() is one line that names the place, the user's word and what would be
+/// right. The program ends with exit code 1.
 class InputError : public std::runtime_error
 {
 public:
   explicit InputError(const std::string &message) : std::runtime_error(message) {}
-  InputError(const Origin &origin, const std::string &message) : std::runtime_error(origin.prefix() + message) {}
+  InputError(const Origin &origin, const std::string &message) : std::runtime_error(origin.prefix() + message)
+  {}
 };
 
-/// The computation went wrong (NaN, a lost point, an unstable step). what() says where, when and what to change.
-/// The program writes what is needed to look at it and ends with exit code 2.
+/// The computation went wrong (NaN, a lost point, an unstable step). what() says where, when and what to
+/// change. The program writes what is needed to look at it and ends with exit code 2.
 class NumericalError : public std::runtime_error
 {
 public:

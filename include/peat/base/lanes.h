@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-// Kernels and laws work on eight points at a time. A `Lanes` is an ordinary value to write formulas with; the compiler
-// maps it to the widest registers the target has (one AVX-512, two AVX2 or four SSE2 registers).
+// Kernels and laws work on eight points at a time. A `Lanes` is an ordinary value to write formulas with; the
+// compiler maps it to the widest registers the target has (one AVX-512, two AVX2 or four SSE2 registers).
 
 namespace peat {
 constexpr unsigned int n_lanes = 8;

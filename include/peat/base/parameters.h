@@ -45,12 +45,13 @@ inline Range strictly_between(const double lower, const double upper, const std:
   return {unit, lower, upper, false, false};
 }
 
-/// One section of a parameter file. To declare an entry is to read it: after `add("Young modulus", E, ...)` the
-/// variable E holds the value that the file gives, or keeps the default it had. Whatever the file contains that was
-/// declared by nobody is refused by ParameterFile::refuse_unknown_entries().
+/// One section of a parameter file. To declare an entry is to read it: after `add("Young modulus", E, ...)`
+/// the variable E holds the value that the file gives, or keeps the default it had. Whatever the file
+/// contains that was declared by nobody is refused by ParameterFile::refuse_unknown_entries().
 ///
-/// Numbers may be expressions of the file's `Constants`; they are evaluated here. Every failure is an InputError that
-/// names file and line. Sections are cheap handles: copy them freely, as long as their ParameterFile lives.
+/// Numbers may be expressions of the file's `Constants`; they are evaluated here. Every failure is an
+/// InputError that names file and line. Sections are cheap handles: copy them freely, as long as their
+/// ParameterFile lives.
 class Section
 {
 public:
@@ -62,7 +63,8 @@ public:
   /// Free text, a name or a file name.
   void add(const std::string &key, std::string &value, const std::string &text);
   /// One of several words.
-  void add(const std::string &key, std::string &value, const std::vector<std::string> &choices, const std::string &text);
+  void add(const std::string &key, std::string &value, const std::vector<std::string> &choices,
+           const std::string &text);
   /// Numbers separated by commas. With n_values > 0 exactly so many must be given.
   void add(const std::string &key, std::vector<double> &value, unsigned int n_values, const Range &range,
            const std::string &text);
@@ -71,23 +73,24 @@ public:
   /// Names separated by commas, each one of the choices.
   void add(const std::string &key, std::vector<std::string> &value, const std::vector<std::string> &choices,
            const std::string &text);
-  /// A function of x, y, z, t and the constants with `n_components` parts separated by commas. The default is the
-  /// text the function was made from.
+  /// A function of x, y, z, t and the constants with `n_components` parts separated by commas. The default is
+  /// the text the function was made from.
   void add(const std::string &key, Function &value, unsigned int n_components, const std::string &unit,
            const std::string &text);
 
   /// The section of that name below this one; it need not be in the file.
   Section subsection(const std::string &name) const;
 
-  /// Names of the sections below this one that the *user* named, in the file's order. `example` stands for them in
-  /// the reference (`peat parameters`), where there is no file.
+  /// Names of the sections below this one that the *user* named, in the file's order. `example` stands for
+  /// them in the reference (`peat parameters`), where there is no file.
   std::vector<std::string> user_sections(const std::string &example) const;
 
   /// Whether the file sets this key / holds this section.
   bool has(const std::string &key) const;
   bool has_subsection(const std::string &name) const;
 
-  /// True while the reference is being written: there is no file, and every member of a family declares its entries.
+  /// True while the reference is being written: there is no file, and every member of a family declares its
+  /// entries.
   bool describing() const;
 
   /// The last part of this section's path, e.g. the name of a body.
@@ -99,6 +102,14 @@ public:
   Origin origin(const std::string &key = "") const;
   /// Throws an InputError at that key (or, if the file does not set it, at the section).
   [[noreturn]] void fail(const std::string &key, const std::string &message) const;
+  /// Throws an InputError if the file does not set the key that `owner`, e.g. "body 'ground'", cannot do
+  /// without; points at the entry that may be a misspelt one.
+  void require(const std::string &key, const std::string &owner) const;
+  /// Throws an InputError if a function of time alone has no value at t = 0.
+  void require_start(const std::string &key, const Function &value) const;
+
+  /// Functions that are read from now on, in any section, may depend on z only in three dimensions.
+  void set_dimension(unsigned int dim);
 
   /// The constants of the file, for expressions that are not numbers or functions (shapes).
   const Constants &constants() const;
@@ -111,7 +122,8 @@ private:
   internal::SectionNode *node;
 };
 
-/// A parameter file in deal.II's format (subsection, set, end, include, comments, continuation lines) with what
+/// A parameter file in deal.II's format (subsection, set, end, include, comments, continuation lines) with
+/// what
 /// `--set` overrides.
 class ParameterFile
 {

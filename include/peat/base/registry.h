@@ -35,10 +35,11 @@ struct Member
   }
 };
 
-/// Reads which member of a family the entry `key` of a section chooses, and makes it. A member's own parameters stand
-/// in the subsection that has its name. In the reference every member declares its entries.
+/// Reads which member of a family the entry `key` of a section chooses, and makes it. A member's own
+/// parameters stand in the subsection that has its name. In the reference every member declares its entries.
 template <class Base>
-std::unique_ptr<Base> choose(Section section, const std::string &key, std::string fallback, const std::string &text)
+std::unique_ptr<Base> choose(Section section, const std::string &key, std::string fallback,
+                             const std::string &text)
 {
   std::vector<std::string> names;
   std::string explained = text;

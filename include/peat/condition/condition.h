@@ -11,8 +11,8 @@
 #include <vector>
 
 namespace peat {
-/// Where a condition acts: faces of the mesh, a region of nodes, or the surface of a body (or its part that looks in
-/// one direction).
+/// Where a condition acts: faces of the mesh, a region of nodes, or the surface of a body (or its part that
+/// looks in one direction).
 template <int dim>
 struct Place
 {
@@ -21,18 +21,28 @@ struct Place
   std::vector<unsigned int> boundaries; ///< ids of mesh faces
   std::string body;                     ///< whose surface; "" if none
   int direction = -1;                   ///< of that surface, numbered like mesh faces; -1 for all of it
-  std::shared_ptr<const Shape<dim>> region; ///< nodes, or the part of the surface, inside; nullptr for no restriction
+  std::shared_ptr<const Shape<dim>>
+      region; ///< nodes, or the part of the surface, inside; nullptr for no restriction
 
   bool on_mesh() const { return body.empty(); }
   bool contains(const SurfacePoint<dim> &point) const;
+  /// Whether a node of the mesh lies in the region (within tolerance()), if there is one.
+  bool contains_node(const dealii::Point<dim> &x, const double tolerance) const
+  {
+    return !region || region->distance(x) <= tolerance;
+  }
+  static double tolerance(const Grid<dim> &grid) { return 1e-9 * grid.smallest_cell_size(); }
 };
 
-/// A boundary condition or load. It sees nodal fields and never points; it acts where it overrides a stage of the step.
+/// A boundary condition or load. It sees nodal fields and never points; it acts where it overrides a stage of
+/// the step.
 template <int dim>
 class Condition
 {
 public:
-  Condition(Section section, Place<dim> place) : section(section), place(std::move(place)), name(section.name()) {}
+  Condition(Section section, Place<dim> place)
+      : section(section), place(std::move(place)), name(section.name())
+  {}
   virtual ~Condition() = default;
 
   /// Whose surface it needs, or "".
@@ -48,14 +58,16 @@ public:
   /// Prescribe another velocity field than `new_velocity` in the same way (re-mapped velocities).
   virtual void constrain_velocity(const ActiveNodes<dim> &, double /*end_time*/, double /*dt*/,
                                   std::vector<double> & /*velocity*/) const
-  {
-  }
+  {}
   /// Prescribe `flux`.
   virtual void constrain_flux(const ActiveNodes<dim> &, const Surface<dim> &, NodalFields<dim> &) const {}
   /// Mesh faces for which this condition replaces the default, an impermeable wall.
   virtual std::vector<unsigned int> opened_boundaries() const { return {}; }
-  /// Whether it makes sense without any saturated body.
+  /// Whether it says what the pore fluid does at its place. Only one condition may, and the body there is
+  /// saturated.
   virtual bool concerns_fluid() const { return false; }
+  /// Whether it prescribes this component of the motion on a mesh face. Only one condition may.
+  virtual bool prescribes(unsigned int /*boundary*/, unsigned int /*component*/) const { return false; }
 
   const Section section;
   const Place<dim> place;
@@ -92,10 +104,12 @@ struct ConditionMember
 {
   ConditionMember(const std::string &name, const std::string &text)
   {
-    condition_family<2>()[name] = {text, [](const Section &s, const Place<2> &p) -> std::unique_ptr<Condition<2>> {
+    condition_family<2>()[name] = {text,
+                                   [](const Section &s, const Place<2> &p) -> std::unique_ptr<Condition<2>> {
                                      return std::make_unique<Member<2>>(s, p);
                                    }};
-    condition_family<3>()[name] = {text, [](const Section &s, const Place<3> &p) -> std::unique_ptr<Condition<3>> {
+    condition_family<3>()[name] = {text,
+                                   [](const Section &s, const Place<3> &p) -> std::unique_ptr<Condition<3>> {
                                      return std::make_unique<Member<3>>(s, p);
                                    }};
   }

@@ -35,20 +35,12 @@ public:
   bool is_occupied(const CellId cell) const { return slot[cell] != no_index; }
   const std::vector<CellId> &occupied_cells() const { return cells; }
 
-  /// Let each cell use, instead of a node that has little mass beside the cell's heaviest one, that node's nearest
-  /// neighbour in the cell with enough (aggregation). The shape function of the one is thereby added to the other's,
-  /// for all sums and all interpolations in this cell: partition of unity, momentum and work are kept, and a sliver of
-  /// material in a cell accelerates with the body it belongs to instead of limiting the step.
-  ///
-  /// @param mass one value a node, `stride` apart, from sums that were made without aggregation
-  /// @return whether any cell of this rank does so
-  bool aggregate(const double *mass, unsigned int stride, double smallest_share);
-  /// Each cell uses its own nodes again.
-  void separate();
-
   const dealii::Point<dim> &position(const unsigned int i) const { return positions[i]; }
   const Grid<dim> &grid() const { return background; }
   NodeId grid_node(const unsigned int i) const { return node[i]; }
+  /// Position in cell_nodes() of the cell's own nodes, in deal.II's order of vertices.
+  unsigned int own_node(unsigned int vertex) const;
+
   /// Number of a node before the last rebuild, or no_index if it was not active.
   std::uint32_t previous_index(const unsigned int i) const { return old_index[node[i]]; }
   /// Each node is counted by one rank in sums over nodes.
@@ -62,6 +54,8 @@ public:
   /// Replace, at each node, n_components values starting at data[i * n_components] by their sums over the
   /// ranks.
   void sum_over_ranks(double *data, unsigned int n_components) const;
+  /// The same with the largest of the ranks' values.
+  void max_over_ranks(double *data, unsigned int n_components) const;
 
   /// Counts the rebuilds, so that others know when what they derived is stale.
   unsigned int generation() const { return n_rebuilds; }
@@ -69,10 +63,9 @@ public:
 private:
   void number_nodes(const std::vector<CellId> &occupied_cells);
   void make_exchange();
+  template <typename Combine>
+  void combine_over_ranks(double *data, unsigned int n_components, const Combine &combine) const;
   unsigned int add(NodeId grid_node);
-  unsigned int nearest_heavy_node(const std::array<double, 1 << dim> &own_mass, unsigned int local,
-                                  double least_mass) const;
-  unsigned int own_node(unsigned int vertex) const;
 
   const Grid<dim> &background;
   const unsigned int reach;
@@ -82,8 +75,6 @@ private:
   std::vector<CellId> cells;
   std::vector<std::uint32_t> slot;
   std::vector<std::uint32_t> table;
-  /// What aggregation has replaced in the table: place and own node.
-  std::vector<std::pair<std::size_t, std::uint32_t>> replaced;
   std::vector<NodeId> node;
   std::vector<std::uint32_t> active_index; ///< by NodeId
   std::vector<std::uint32_t> old_index;    ///< by NodeId

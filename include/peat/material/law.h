@@ -15,7 +15,8 @@ using StressLanes = std::array<Lanes, 6>;
 /// A full tensor per lane, row by row: gradient[3 * i + j] = d u_i / d x_j.
 using GradientLanes = std::array<Lanes, 9>;
 
-/// A named quantity that points remember: a field of the points, a column of the output, part of a checkpoint.
+/// A named quantity that points remember: a field of the points, a column of the output, part of a
+/// checkpoint.
 struct StateField
 {
   std::string name;
@@ -24,9 +25,9 @@ struct StateField
   std::vector<double> initial;
 };
 
-/// The skeleton's constitutive law, for eight points at a time. Stresses are effective Cauchy stresses [Pa], tension
-/// positive. A law is three-dimensional, knows neither mesh nor method, and keeps no data of points: what it
-/// remembers per point it names in state() and gets handed back.
+/// The skeleton's constitutive law, for eight points at a time. Stresses are effective Cauchy stresses [Pa],
+/// tension positive. A law is three-dimensional, knows neither mesh nor method, and keeps no data of points:
+/// what it remembers per point it names in state() and gets handed back.
 class Law
 {
 public:
@@ -35,18 +36,19 @@ public:
   /// What the law remembers per point besides the stress.
   virtual std::vector<StateField> state() const { return {}; }
 
-  /// Whether volumes and extents of points follow the motion. Small-strain laws refer everything to the volume at the
-  /// start.
+  /// Whether volumes and extents of points follow the motion. Small-strain laws refer everything to the
+  /// volume at the start.
   virtual bool finite_strain() const = 0;
 
-  /// Advance one step. `increment` is the displacement gradient of the step, dt * grad v, referred to the positions at
-  /// its start; `stress` and `state` (one Lanes per component, fields in the order of state()) are updated in place.
-  /// Lanes that hold no point carry zero increments and the state of a valid point.
+  /// Advance one step. `increment` is the displacement gradient of the step, dt * grad v, referred to the
+  /// positions at its start; `stress` and `state` (one Lanes per component, fields in the order of state())
+  /// are updated in place. Lanes that hold no point carry zero increments and the state of a valid point.
   virtual void update(const GradientLanes &increment, StressLanes &stress, Lanes *state) const = 0;
 
-  /// Consistent tangent d(stress)/d(increment's symmetric part) at the present state, [Pa], `tangent[6 * i + j]` in the
-  /// order of StressLanes; column j is the response to an engineering shear for j >= 3.
-  virtual void tangent(const StressLanes &stress, const Lanes *state, std::array<Lanes, 36> &tangent) const = 0;
+  /// Consistent tangent d(stress)/d(increment's symmetric part) at the present state, [Pa], `tangent[6 * i +
+  /// j]` in the order of StressLanes; column j is the response to an engineering shear for j >= 3.
+  virtual void tangent(const StressLanes &stress, const Lanes *state,
+                       std::array<Lanes, 36> &tangent) const = 0;
 
   /// Elastic energy stored per present volume [J/m^3].
   virtual Lanes stored_energy(const StressLanes &stress, const Lanes *state) const = 0;

@@ -41,9 +41,10 @@ struct Slice
 
 /// A body of one material: its points in a deal.II particle handler, and which points lie in which cell.
 ///
-/// The particle handler stores positions and rows of properties in flat arrays, which kernels address by handle. Which
-/// cell a point is in is kept here, so that a point which crosses a face costs a few nanoseconds; the handler's own,
-/// dear sort runs when points leave for another rank and before output, see synchronise().
+/// The particle handler stores positions and rows of properties in flat arrays, which kernels address by
+/// handle. Which cell a point is in is kept here, so that a point which crosses a face costs a few
+/// nanoseconds; the handler's own, dear sort runs when points leave for another rank and before output, see
+/// synchronise().
 template <int dim>
 class Body
 {
@@ -62,7 +63,10 @@ public:
 
   /// Row of properties and coordinates of a point.
   double *row(const std::uint32_t handle) { return first_row + std::size_t(handle) * columns.n_columns; }
-  const double *row(const std::uint32_t handle) const { return first_row + std::size_t(handle) * columns.n_columns; }
+  const double *row(const std::uint32_t handle) const
+  {
+    return first_row + std::size_t(handle) * columns.n_columns;
+  }
   dealii::Point<dim> &position(const std::uint32_t handle) { return first_position[handle]; }
   const dealii::Point<dim> &position(const std::uint32_t handle) const { return first_position[handle]; }
   dealii::types::particle_index id(const std::uint32_t handle) const;
@@ -77,14 +81,15 @@ public:
   struct Relocation
   {
     bool cells_changed = false; ///< a cell got its first point or lost its last one
-    bool leaves_rank = false;   ///< a point has entered a cell of another rank: synchronise() before the next step
+    bool leaves_rank =
+        false; ///< a point has entered a cell of another rank: synchronise() before the next step
   };
-  /// Assign the noted points to their new cells. Throws NumericalError for a point that left the mesh or moved further
-  /// than one cell.
+  /// Assign the noted points to their new cells. Throws NumericalError for a point that left the mesh or
+  /// moved further than one cell.
   Relocation relocate(double time);
 
-  /// Bring the particle handler up to date: points move to the rank that owns their cell, storage is in cell order
-  /// again. Collective. Throws NumericalError if a point gets lost.
+  /// Bring the particle handler up to date: points move to the rank that owns their cell, storage is in cell
+  /// order again. Collective. Throws NumericalError if a point gets lost.
   void synchronise(double time);
 
   /// Check that the global number of points is what it was at the start.

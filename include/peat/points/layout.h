@@ -15,19 +15,13 @@ struct SchemeFields
   bool extent = false;
 };
 
-/// The columns of a body's points: what is stored, under which name, and where in the row of a point. A body stores
-/// only what its material and the scheme use; a column that does not exist has the index -1.
+/// The columns of a body's points: what is stored, under which name, and where in the row of a point. A body
+/// stores only what its material and the scheme use; a column that does not exist has the index -1.
 ///
 /// Vectors have dim components. Stress has xx, yy, zz, xy in 2-D and xx, yy, zz, xy, yz, zx in 3-D.
 struct Layout
 {
-  enum class Kind
-  {
-    scalar,
-    vector,
-    stress,
-    other
-  };
+  enum class Kind { scalar, vector, stress, other };
   struct Field
   {
     std::string name;
@@ -45,16 +39,16 @@ struct Layout
   unsigned int n_columns = 0;
   std::vector<Field> fields;
 
-  int mass = -1;              ///< [kg]
-  int volume = -1;            ///< [m^dim]; per metre of depth in 2-D
-  int velocity = -1;          ///< [m/s]
-  int displacement = -1;      ///< [m] since the start
-  int stress = -1;            ///< effective Cauchy stress [Pa]
-  int pressure = -1;          ///< pore pressure [Pa]; saturated bodies
-  int porosity = -1;          ///< [-]; saturated bodies under finite strain (constant otherwise)
-  int extent = -1;            ///< half the edge lengths of the point's domain [m]; GIMP
-  int state = -1;             ///< what the law remembers
-  unsigned int n_state = 0;   ///< number of columns of the law's memory
+  int mass = -1;            ///< [kg]
+  int volume = -1;          ///< [m^dim]; per metre of depth in 2-D
+  int velocity = -1;        ///< [m/s]
+  int displacement = -1;    ///< [m] since the start
+  int stress = -1;          ///< effective Cauchy stress [Pa]
+  int pressure = -1;        ///< pore pressure [Pa]; saturated bodies
+  int porosity = -1;        ///< [-]; saturated bodies under finite strain (constant otherwise)
+  int extent = -1;          ///< half the edge lengths of the point's domain [m]; GIMP
+  int state = -1;           ///< what the law remembers
+  unsigned int n_state = 0; ///< number of columns of the law's memory
 
 private:
   int add(const std::string &name, const std::string &unit, unsigned int n_components, Kind kind);

@@ -7,8 +7,8 @@
 #include <vector>
 
 namespace peat {
-/// Massless points that move with the material: pieces of a body's surface, on which tractions act, and probes.
-/// Each is handled by one rank.
+/// Massless points that move with the material: pieces of a body's surface, on which tractions act, and
+/// probes. Each is handled by one rank.
 template <int dim>
 class Tracers
 {
@@ -25,12 +25,12 @@ public:
 
   /// Put a tracer here if this rank owns the cell it lies in. All ranks call it for all tracers.
   void add(std::uint32_t id, const dealii::Point<dim> &position, const dealii::Tensor<1, dim> &area);
-  /// Put tracers on the surface of a shape where this rank's cells are, with the given number of pieces per cell and
-  /// direction. Faces that lie on the edge of the mesh are left out.
+  /// Put tracers on the surface of a shape where this rank's cells are, with the given number of pieces per
+  /// cell and direction. Faces that lie on the edge of the mesh are left out.
   void cover(const Shape<dim> &shape, unsigned int pieces_per_direction);
 
-  /// Find for each tracer the nodes that carry it. A tracer whose own cell holds no material (the surface has risen
-  /// a little above the grid line) is carried by the cell below it.
+  /// Find for each tracer the nodes that carry it. A tracer whose own cell holds no material (the surface has
+  /// risen a little above the grid line) is carried by the cell below it.
   void locate(const ActiveNodes<dim> &nodes);
   /// As located.
   const Surface<dim> &surface() const { return carried; }

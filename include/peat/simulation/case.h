@@ -37,6 +37,7 @@ struct Case
   bool is_saturated() const;
   double end_time() const;
 
+  Section section; ///< the top of the file
   std::string title;
   GridParameters<dim> grid;
   std::vector<std::unique_ptr<Material>> materials;

@@ -8,13 +8,7 @@
 
 namespace peat {
 /// Exit codes of the program.
-enum ExitCode
-{
-  exit_success = 0,
-  exit_input_error = 1,
-  exit_numerical_error = 2,
-  exit_interrupted = 130
-};
+enum ExitCode { exit_success = 0, exit_input_error = 1, exit_numerical_error = 2, exit_interrupted = 130 };
 
 /// `peat run`: run the case and leave an output directory.
 int command_run(const RunOptions &options, MPI_Comm communicator);

@@ -83,7 +83,7 @@ private:
     unsigned long n_outside = 0;
   };
 
-  void read_table(Reference &reference, const std::string &directory) const;
+  void read_table(Reference &reference, const std::string &directory, const Case<dim> &parameters) const;
   double expected(const Reference &reference, const Curve *curve, const dealii::Point<dim> &x,
                   double time) const;
   Norms compare_cells(const Reference &reference, const Curve *curve, double time,

@@ -5,8 +5,8 @@
 #include <string>
 
 namespace peat {
-/// What a run tells: lines to log.txt and, unless quiet, to the terminal; a progress line to the terminal alone.
-/// Only rank 0 writes.
+/// What a run tells: lines to log.txt and, unless quiet, to the terminal; a progress line to the terminal
+/// alone. Only rank 0 writes.
 class Log
 {
 public:

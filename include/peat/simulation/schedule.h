@@ -15,7 +15,10 @@ public:
   static Schedule at(std::vector<double> times, double start, double end);
 
   /// The next time that is due; infinity when none is left.
-  double next() const { return position < times.size() ? times[position] : std::numeric_limits<double>::infinity(); }
+  double next() const
+  {
+    return position < times.size() ? times[position] : std::numeric_limits<double>::infinity();
+  }
   /// Whether something is due at this time, up to the round-off of sums of steps; if so it is ticked off.
   bool due(double time);
 

@@ -44,7 +44,8 @@ template <int dim>
 class Simulation
 {
 public:
-  Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options, MPI_Comm communicator);
+  Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options,
+             MPI_Comm communicator);
   ~Simulation();
 
   /// Returns false if a signal ended the run early. Throws NumericalError after writing the last state.
@@ -62,11 +63,13 @@ private:
   Case<dim> &parameters;
   const RunOptions options;
   MPI_Comm communicator;
-  const std::string directory;
   WallTimes wall;
-  Log log;
+  // What may refuse the parameter file comes first, and leaves no directory behind.
   Grid<dim> grid;
   Scene<dim> scene;
+  Comparison<dim> comparison;
+  const std::string directory;
+  Log log;
   std::unique_ptr<ExplicitMPM<dim>> solver;
   SchemeParameters stage_scheme;
   std::unique_ptr<Balances<dim>> balances;

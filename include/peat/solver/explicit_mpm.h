@@ -22,11 +22,12 @@ struct Ledger
   double external_work = 0.;       ///< of tractions, gravity and prescribed motion [J]
   double gravity_work = 0.;        ///< of gravity alone [J]
   double seepage_dissipation = 0.; ///< integral of |w|^2 / kappa [J]
-  double seepage_work = 0.;        ///< all that Darcy's law takes from the fluid's energy p^2 / (2 Q), negative [J]
-  double fluid_outflow = 0.;       ///< of pore fluid through the boundaries [m^dim]
-  double fluid_squeezed = 0.;      ///< pore volume lost by compression that V n does not show (small strain) [m^dim]
-  dealii::Tensor<1, dim> impulse;  ///< of all external forces [N s]
-  double gross_impulse = 0.;       ///< integral of the sum of the external forces' magnitudes on nodes [N s]
+  double seepage_work = 0.;  ///< all that Darcy's law takes from the fluid's energy p^2 / (2 Q), negative [J]
+  double fluid_outflow = 0.; ///< of pore fluid through the boundaries [m^dim]
+  double fluid_squeezed =
+      0.; ///< pore volume lost by compression that V n does not show (small strain) [m^dim]
+  dealii::Tensor<1, dim> impulse; ///< of all external forces [N s]
+  double gross_impulse = 0.;      ///< integral of the sum of the external forces' magnitudes on nodes [N s]
 };
 
 /// The bodies, the conditions on them and the tracers that move with them: what a stage of a run works on.
@@ -71,9 +72,9 @@ public:
 
 private:
   // The stages of a step, in the order of the equations.
-  void aggregate_small_nodes();
   void points_to_nodes();
   void add_loads();
+  void find_velocities();
   void solve_momentum();
   void constrain_motion();
   void solve_darcy();
@@ -84,8 +85,9 @@ private:
 
   void resize_fields();
   void renumber_kept_velocity();
-  void complete_kept_velocity();
-  double fastest_on_any_rank() const;
+  void find_reference_masses();
+  void keep_velocities();
+  bool is_small(std::size_t node) const;
   dealii::Tensor<1, dim> total_momentum() const;
   PressureUpdate pressure_update(std::size_t body) const;
   const Surface<dim> &surface(const Condition<dim> &condition) const;
@@ -102,15 +104,16 @@ private:
   NodalFields<dim> nodal;
   /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
   std::vector<double> carrying_velocity;
-  /// What nodes keep of their velocity from step to step; empty if they keep nothing.
+  /// What nodes keep of their velocity from step to step, rows of dim + 1 as Kernels::scatter() takes them;
+  /// empty if nodes keep nothing.
   std::vector<double> kept_velocity;
-  std::vector<char> kept_is_known; ///< nodes that carried mass in the last step
+  /// Mass of the heaviest node of the cells that a node belongs to [kg].
+  std::vector<double> reference_mass;
+  unsigned int steps_to_reference_masses = 0;
   /// Nodes and components on impermeable faces of the mesh.
   std::vector<std::size_t> closed_rows;
   dealii::Tensor<1, dim> gravity_now;
 
-  /// Steps until the small nodes are looked for again; 0: at once.
-  unsigned int steps_to_aggregation = 0;
   double now;
   StepFindings findings;
   Ledger<dim> book;

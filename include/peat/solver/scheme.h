@@ -13,8 +13,7 @@ struct SchemeParameters
   explicit SchemeParameters(Section section);
 
   /// When in the step stresses follow the velocities.
-  enum class StressUpdate
-  {
+  enum class StressUpdate {
     last,         ///< USL: from the nodes' new velocities
     modified_last ///< MUSL: from the points' new velocities, mapped back to the nodes
   };
@@ -25,10 +24,11 @@ struct SchemeParameters
 
   Basis basis;
   StressUpdate stress_update;
-  bool nodes_keep_velocity;      ///< only the points' difference from the nodes' last velocity is mapped to the nodes
-  bool grid_velocity;            ///< the points take the grid's velocity each step (PIC)
-  double relaxation_time = 0.;   ///< of the points' velocity towards the grid's [s]; 0: never
-  double local_damping = 0.;     ///< share of the out-of-balance force that opposes the velocity
+  bool nodes_keep_velocity;    ///< only the points' difference from the nodes' last velocity is mapped to the
+                               ///< nodes
+  bool grid_velocity;          ///< the points take the grid's velocity each step (PIC)
+  double relaxation_time = 0.; ///< of the points' velocity towards the grid's [s]; 0: never
+  double local_damping = 0.;   ///< share of the out-of-balance force that opposes the velocity
   bool pressure_of_cells = true; ///< pore pressure acts with its mean over the points of a cell
   double pressure_filter = 0.;   ///< rate of the filter in units of c_u / h
   double step_factor = 0.8;      ///< step over stable step

@@ -10,14 +10,20 @@ namespace peat {
 template <int dim>
 struct Sums
 {
-  static constexpr unsigned int mass = 0;               ///< sum N m [kg]
-  static constexpr unsigned int momentum = 1;           ///< sum N m v [kg m/s]
-  static constexpr unsigned int force = 1 + dim;        ///< - sum V (sigma'' - alpha p I) grad N [N]
-  static constexpr unsigned int n_dry = 1 + 2 * dim;    ///< columns of a scene without pore fluid
-  static constexpr unsigned int resistance = n_dry;     ///< sum N V / kappa
-  static constexpr unsigned int fluid_inertia = n_dry + 1; ///< sum N V rho_f [kg]
+  static constexpr unsigned int mass = 0;                   ///< sum N m [kg]
+  static constexpr unsigned int momentum = 1;               ///< sum N m v [kg m/s]
+  static constexpr unsigned int force = 1 + dim;            ///< - sum V (sigma'' - alpha p I) grad N [N]
+  static constexpr unsigned int n_dry = 1 + 2 * dim;        ///< columns of a scene without pore fluid
+  static constexpr unsigned int resistance = n_dry;         ///< sum N V / kappa
+  static constexpr unsigned int fluid_inertia = n_dry + 1;  ///< sum N V rho_f [kg]
   static constexpr unsigned int pressure_force = n_dry + 2; ///< sum V p grad N [N]
   static constexpr unsigned int n_saturated = n_dry + 2 + dim;
+  /// With nodes that keep their velocity, dim more columns: sum N m v, while `momentum` is of the difference
+  /// only.
+  static constexpr unsigned int full_momentum(const bool saturated)
+  {
+    return saturated ? n_saturated : n_dry;
+  }
 };
 
 /// What the points' visits of one step find, over this rank's points.
@@ -25,8 +31,9 @@ struct StepFindings
 {
   double largest_speed = 0.;
   bool finite = true;
-  double fluid_outflow = 0.;  ///< sum V div w dt [m^dim]
-  double fluid_squeezed = 0.; ///< sum V alpha div v dt of bodies whose V and n do not follow the motion [m^dim]
+  double fluid_outflow = 0.; ///< sum V div w dt [m^dim]
+  double fluid_squeezed =
+      0.; ///< sum V alpha div v dt of bodies whose V and n do not follow the motion [m^dim]
 };
 
 /// The share of the grid's part in the points' new velocity, see theory.md (transfer).
@@ -40,18 +47,20 @@ struct VelocityUpdate
 /// How a step treats the pore pressure.
 struct PressureUpdate
 {
-  /// Pore pressure acts with its mean over the points of a cell, and follows the means of div v and div w: one value a
-  /// cell, as in the element Q1-P0, where one value a point would lock. Each point still has its own pressure, which
-  /// moves with it.
+  /// Pore pressure acts with its mean over the points of a cell, and follows the means of div v and div w:
+  /// one value a cell, as in the element Q1-P0, where one value a point would lock. Each point still has its
+  /// own pressure, which moves with it.
   bool cell_means = true;
-  /// Share by which each point's pressure goes towards the mean of its cell in this step; conserves sum V p / Q.
+  /// Share by which each point's pressure goes towards the mean of its cell in this step; conserves sum V p /
+  /// Q.
   double filter = 0.;
 };
 
-/// The visits of the points of a body in a step, cell by cell. Members differ by basis, and by whether there is pore
-/// fluid; which one serves a body is decided once.
+/// The visits of the points of a body in a step, cell by cell. Members differ by basis, and by whether there
+/// is pore fluid; which one serves a body is decided once.
 ///
-/// Nodal arrays have one row per active node: `sums` with `stride` columns as in Sums, all others with dim columns.
+/// Nodal arrays have one row per active node: `sums` with `stride` columns as in Sums, all others with dim
+/// columns.
 template <int dim>
 class Kernels
 {
@@ -60,23 +69,25 @@ public:
 
   static std::unique_ptr<Kernels> make(Basis basis, bool saturated);
 
-  /// Points to nodes: mass, momentum, internal force and, with pore fluid, the terms of Darcy's law. With a nodal
-  /// velocity `kept`, momentum is that of the difference v_p - kept(x_p) only.
+  /// Points to nodes: mass, momentum, internal force and, with pore fluid, the terms of Darcy's law. With
+  /// nodal velocities `kept`, momentum is that of the difference v_p - kept(x_p) only. `kept` has rows of dim
+  /// + 1: the velocity and 1, or zeros for a node that keeps none; what a point sees is the mean over the
+  /// nodes that do, by weight.
   virtual void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const double *kept,
                        const PressureUpdate &pressure, double *sums, unsigned int stride) const = 0;
 
-  /// Points' velocities from the nodes' acceleration `a` and new velocity `v` (modified-update-stress-last: and their
-  /// momentum back to the nodes, columns of `momentum`).
-  virtual void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
-                                 const VelocityUpdate &update, double *momentum) const = 0;
+  /// Points' velocities from the nodes' acceleration `a` and new velocity `v` (modified-update-stress-last:
+  /// and their momentum back to the nodes, columns of `momentum`).
+  virtual void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a,
+                                 const double *v, const VelocityUpdate &update, double *momentum) const = 0;
 
   /// Strain, stress, pressure, volume and position from the nodal velocity v and the nodal flux w = kappa R.
-  virtual void deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *v, const double *w, double dt,
-                      const PressureUpdate &pressure, StepFindings &findings) const = 0;
+  virtual void deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *v, const double *w,
+                      double dt, const PressureUpdate &pressure, StepFindings &findings) const = 0;
 
   /// Both of the above in one visit, without the way back to the nodes (update-stress-last).
-  virtual void advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
-                                  const double *w, const VelocityUpdate &update, const PressureUpdate &pressure,
-                                  StepFindings &findings) const = 0;
+  virtual void advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a,
+                                  const double *v, const double *w, const VelocityUpdate &update,
+                                  const PressureUpdate &pressure, StepFindings &findings) const = 0;
 };
 } // namespace peat

@@ -7,10 +7,10 @@
 
 namespace peat {
 /// The bases: how many nodes per direction a point can reach from its cell.
-enum class Basis
-{
+enum class Basis {
   q1 = 2,  ///< FE_Q(1): the cell's own nodes
-  gimp = 4 ///< FE_Q(1) averaged over the point's domain (Bardenhagen & Kober 2004): the neighbour cells' nodes too
+  gimp = 4 ///< FE_Q(1) averaged over the point's domain (Bardenhagen & Kober 2004): the neighbour cells'
+           ///< nodes too
 };
 
 /// Shape functions of eight points of one cell in one direction: value and slope at each reachable node.
@@ -54,8 +54,8 @@ inline void evaluate_direction(const Lanes x, const Lanes /*half_extent*/, const
   w.slope[0] = broadcast(-inverse);
 }
 
-/// GIMP on FE_Q(1): the point's domain [x - l, x + l] is cut by the cell faces; each part acts as one Q1 point of its
-/// cell, placed at the part's middle. What sticks out of the mesh is cut off.
+/// GIMP on FE_Q(1): the point's domain [x - l, x + l] is cut by the cell faces; each part acts as one Q1
+/// point of its cell, placed at the part's middle. What sticks out of the mesh is cut off.
 inline void evaluate_direction(const Lanes x, const Lanes half_extent, const CellInterval &cell,
                                DirectionWeights<4> &w)
 {

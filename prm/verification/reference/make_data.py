@@ -125,9 +125,9 @@ def p2(p):
     S, H = soil(p), p["H"]
     cv = terzaghi.coeffs(S["K"], S["M"], S["Q"], S["alpha"])[0]
     z = np.linspace(0, H, 81)
-    r = [terzaghi.selfweight(z, T * H**2 / cv, H, S["K"], S["M"], S["rho"], S["rho_f"], p["g_r"], S["Q"], S["alpha"])
+    r = [terzaghi.selfweight(z, T * H**2 / cv, H, S["K"], S["M"], S["rho"], S["rho_f"], p["g"], S["Q"], S["alpha"])
          for T in p["T_profiles"]]
-    undrained = -S["rho"] * p["g_r"] * (H * z - z**2 / 2) / (S["M"] + S["alpha"]**2 * S["Q"])
+    undrained = -S["rho"] * p["g"] * (H * z - z**2 / 2) / (S["M"] + S["alpha"]**2 * S["Q"])
     write("P2_selfweight_consolidation", p,
           ["z [m]"] + ["p(T=%g) [Pa]" % T for T in p["T_profiles"]] +
           ["u(T=%g) after the undrained state [m]" % T for T in p["T_profiles"]],

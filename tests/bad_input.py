@@ -1,0 +1,187 @@
+#!/usr/bin/env python3
+"""Bad parameter files and bad command lines: each is refused in one clear line, before anything is computed.
+
+    bad_input.py [--peat PROGRAM] [--jobs N] [--verbose] [NAME ...]
+
+Each file bad_input/*.prm but the good ones says in its first lines what is expected:
+
+    # expect: line 7; Young modulus; must be > 0      the place and words of the message, separated by ';'
+    # expect: line other.inc:3; ...                   a place in another file
+    # options: --set Grid/Cells=4                     more options of the command line
+
+To be refused means: exit code 1, nothing on standard output, one line on standard error that begins with
+'peat: ' and holds place and words, no file or directory left behind, and all this within a few seconds.
+With NAMEs only the cases whose names contain one of them are run.
+"""
+
+import argparse
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+GOOD = ("good.prm", "dry.prm", "solid.prm")
+SECONDS = 5.0
+# Without it Open MPI starts a daemon for each program.
+os.environ["OMPI_MCA_ess_singleton_isolated"] = "1"
+LONGEST_LINE = 700
+
+# Names, arguments after the program's name, words of the message. '@taken' is a file, '@folder.prm' a directory.
+COMMAND_LINES = [
+    ("missing file", "run missing.prm", ["cannot read the file 'missing.prm'", "No such file"]),
+    ("missing file without command", "missing.prm", ["cannot read the file 'missing.prm'"]),
+    ("missing file to check", "check missing.prm", ["cannot read the file 'missing.prm'"]),
+    ("directory", "run folder.prm", ["cannot read the file 'folder.prm'", "it is a directory"]),
+    ("directory without command", "folder.prm", ["it is a directory"]),
+    ("wrong extension", "table.csv", ["'table.csv' is no command and no parameter file (.prm)", "peat --help"]),
+    ("wrong extension to run", "run table.csv", ["table.csv:2", "cannot understand"]),
+    ("unknown command", "rnu good.prm", ["'rnu' is no command"]),
+    ("no file to run", "run", ["'peat run' needs a parameter file"]),
+    ("no file to check", "check", ["'peat check' needs a parameter file"]),
+    ("two files", "run good.prm dry.prm", ["one parameter file at a time", "'dry.prm'"]),
+    ("two files without command", "good.prm dry.prm", ["one parameter file at a time", "'dry.prm'"]),
+    ("unknown option", "run good.prm --fast", ["'--fast'", "peat --help"]),
+    ("unknown short option", "run good.prm -f", ["'-f'", "peat --help"]),
+    ("option without value", "run good.prm --output", ["--output", "peat --help"]),
+    ("two output directories", "run good.prm --output a --output b", ["--output", "peat --help"]),
+    ("empty output directory", "run good.prm --output ''", ["--output"]),
+    ("set without equals sign", "run good.prm --set Title", ["--set Title", "no '='"]),
+    ("set without name", "run good.prm --set =3", ["--set =3", "no name before '='"]),
+    ("set without value", "run good.prm --set Grid/Cells=", ["--set Grid/Cells=", "Grid/Cells"]),
+    ("set of unknown entry", "run good.prm --set Grid/Cell=4", ["--set Grid/Cell=4", "did you mean 'Cells'?"]),
+    ("set of unknown section", "run good.prm --set Gird/Cells=4,6", ["unknown section 'Gird'", "did you mean 'Grid'?"]),
+    ("set of unknown body", "run good.prm --set Bodies/blok/Shape=box(0,0,1,1)",
+     ["no section 'blok' in Bodies", "did you mean 'block'?"]),
+    ("set of unknown constant", "run good.prm --set Constants/H=1", ["no constant 'H'", "did you mean 'h'?"]),
+    ("set out of range", "run good.prm --set 'Materials/sand/Porosity=1.5'",
+     ["--set Materials/sand/Porosity=1.5", "must be > 0 and < 1"]),
+    ("set of a word", "check good.prm --set Dimension=plane", ["--set Dimension=plane", "unknown name 'plane'"]),
+    ("output is a file", "run good.prm --output table.csv", ["cannot make the output directory 'table.csv'"]),
+    ("output below a file", "run good.prm --output table.csv/out", ["cannot make the output directory 'table.csv/out'"]),
+    ("unknown format", "parameters --format yaml", ["'--format yaml' is unknown", "prm, markdown or json"]),
+    ("parameters of a file", "parameters good.prm", ["'peat parameters' takes no file"]),
+    ("parameters in 4-D", "parameters --dimension 4", ["'--dimension' must be 2 or 3"]),
+    ("parameters in no dimension", "parameters --dimension two", ["two", "--dimension", "peat --help"]),
+]
+
+# What nobody should have to read.
+OURS = re.compile(r"deal\.?II|terminate called|internal error|std::|Assert|MPI_ABORT|backtrace|[Ss]egmentation|\bnan\b")
+
+
+def cases_of_files(names):
+    """Name, arguments, line, words of each bad file."""
+    for name in sorted(os.listdir(os.path.join(HERE, "bad_input"))):
+        if not name.endswith(".prm") or name in GOOD:
+            continue
+        with open(os.path.join(HERE, "bad_input", name), "rb") as file:
+            text = file.read().decode("utf-8", "replace")
+        expect = re.search(r"^# expect: (.*)$", text, re.M)
+        if not expect:
+            sys.exit(f"{name} does not say what is expected")
+        words = [word.strip() for word in expect.group(1).split("; ")]
+        options = re.search(r"^# options: (.*)$", text, re.M)
+        for i, word in enumerate(words):
+            place = re.fullmatch(r"line (?:(\S+):)?(\d+)", word)
+            if place:
+                words[i] = f"peat: {place.group(1) or name}:{place.group(2)}: "
+        arguments = [name] + (shlex.split(options.group(1)) if options else [])
+        yield name[:-4], arguments, words
+
+
+def listing(directory):
+    return sorted(os.path.join(path, name) for path, folders, files in os.walk(directory) for name in folders + files)
+
+
+def problems(peat, arguments, words):
+    """Runs the program in a directory of its own; what is wrong, and what it said."""
+    found = []
+    with tempfile.TemporaryDirectory(prefix="peat_bad_input_") as directory:
+        shutil.copytree(os.path.join(HERE, "bad_input"), directory, dirs_exist_ok=True)
+        os.mkdir(os.path.join(directory, "folder.prm"))
+        before = listing(directory)
+        try:
+            run = subprocess.run([peat] + arguments, cwd=directory, capture_output=True, timeout=SECONDS)
+        except subprocess.TimeoutExpired:
+            return [f"takes more than {SECONDS} s"], ""
+        out, err = (text.decode("utf-8", "replace") for text in (run.stdout, run.stderr))
+        if run.returncode != 1:
+            found.append(f"signal {-run.returncode}" if run.returncode < 0 else f"exit code {run.returncode}, not 1")
+        if out:
+            found.append("something on standard output: " + out.splitlines()[0])
+        if not err.startswith("peat: ") or not err.endswith("\n") or len(err.splitlines()) != 1:
+            found.append("not one line 'peat: ...' on standard error")
+        if len(err) > LONGEST_LINE:
+            found.append(f"a message of {len(err)} characters")
+        if OURS.search(out + err):
+            found.append("our words: " + OURS.search(out + err).group(0))
+        found += [f"does not say {word!r}" for word in words if word not in err]
+        left = [path[len(directory) + 1:] for path in listing(directory) if path not in before]
+        if left:
+            found.append("leaves behind: " + ", ".join(left[:5]))
+    return found, err
+
+
+def good_files_pass(peat):
+    """The good files are good: otherwise the bad ones would prove nothing."""
+    passed = True
+    for name in GOOD:
+        with tempfile.TemporaryDirectory(prefix="peat_bad_input_") as directory:
+            shutil.copytree(os.path.join(HERE, "bad_input"), directory, dirs_exist_ok=True)
+            commands = [["check", name], ["run", name, "--quiet"]]
+            # The complete parameters that a run writes are a good file again.
+            written = os.path.join("output", name[:-4], "parameters.prm")
+            again = os.path.join(directory, "again.prm")
+            for command in commands + [["check", "again.prm"]]:
+                if command[1] == "again.prm" and os.path.exists(os.path.join(directory, written)):
+                    shutil.copy(os.path.join(directory, written), again)
+                run = subprocess.run([peat] + command, cwd=directory, capture_output=True, timeout=60)
+                if run.returncode != 0 or run.stderr:
+                    passed = False
+                    print(f"FAILED  peat {' '.join(command)} ({name}): exit code {run.returncode}\n"
+                          f"        {run.stderr.decode('utf-8', 'replace').strip()}")
+    return passed
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--peat", default=os.path.join(HERE, "..", "build", "peat"), help="the program")
+    parser.add_argument("--jobs", type=int, default=2, help="programs at a time")
+    parser.add_argument("--verbose", action="store_true", help="show all messages")
+    parser.add_argument("names", nargs="*", help="only cases whose names contain one of these")
+    options = parser.parse_args()
+    peat = os.path.abspath(options.peat)
+    if not os.access(peat, os.X_OK):
+        sys.exit(f"there is no program '{peat}'; use --peat")
+
+    cases = []
+    for i, (name, arguments, words) in enumerate(cases_of_files(options.names)):
+        cases.append((name, ["run"] + arguments, words))
+        if i % 6 == 0:
+            cases.append((name + " (check)", ["check"] + arguments, words))
+    for name, arguments, words in COMMAND_LINES:
+        cases.append((name, shlex.split(arguments), words))
+    if options.names:
+        cases = [case for case in cases if any(name in case[0] for name in options.names)]
+
+    n_failed = 0
+    with ThreadPoolExecutor(options.jobs) as pool:
+        results = pool.map(lambda case: problems(peat, case[1], case[2]), cases)
+        for (name, arguments, _), (found, message) in zip(cases, results):
+            n_failed += bool(found)
+            if found or options.verbose:
+                print(f"{'FAILED' if found else 'ok    '}  {name}: peat {' '.join(arguments)}\n"
+                      f"        {message.strip() or '(says nothing)'}")
+                for problem in found:
+                    print("      - " + problem)
+    passed = bool(options.names) or good_files_pass(peat)
+    print(f"{len(cases)} cases, {n_failed} failed")
+    return 0 if passed and n_failed == 0 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
