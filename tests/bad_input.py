@@ -16,6 +16,7 @@ With NAMEs only the cases whose names contain one of them are run.
 
 import argparse
 import os
+import queue
 import re
 import shlex
 import shutil
@@ -27,8 +28,6 @@ from concurrent.futures import ThreadPoolExecutor
 HERE = os.path.dirname(os.path.abspath(__file__))
 GOOD = ("good.prm", "dry.prm", "solid.prm")
 SECONDS = 5.0
-# Without it Open MPI starts a daemon for each program.
-os.environ["OMPI_MCA_ess_singleton_isolated"] = "1"
 LONGEST_LINE = 700
 
 # Names, arguments after the program's name, words of the message. '@taken' is a file, '@folder.prm' a directory.
@@ -73,7 +72,7 @@ COMMAND_LINES = [
 OURS = re.compile(r"deal\.?II|terminate called|internal error|std::|Assert|MPI_ABORT|backtrace|[Ss]egmentation|\bnan\b")
 
 
-def cases_of_files(names):
+def cases_of_files():
     """Name, arguments, line, words of each bad file."""
     for name in sorted(os.listdir(os.path.join(HERE, "bad_input"))):
         if not name.endswith(".prm") or name in GOOD:
@@ -97,53 +96,78 @@ def listing(directory):
     return sorted(os.path.join(path, name) for path, folders, files in os.walk(directory) for name in folders + files)
 
 
-def problems(peat, arguments, words):
-    """Runs the program in a directory of its own; what is wrong, and what it said."""
-    found = []
-    with tempfile.TemporaryDirectory(prefix="peat_bad_input_") as directory:
-        shutil.copytree(os.path.join(HERE, "bad_input"), directory, dirs_exist_ok=True)
-        os.mkdir(os.path.join(directory, "folder.prm"))
-        before = listing(directory)
+class Workplace:
+    """A directory with all files, used by one program at a time."""
+
+    def __init__(self):
+        self.scratch = tempfile.mkdtemp(prefix="peat_bad_input_")
+        self.directory = os.path.join(self.scratch, "case")
+        # With this Open MPI starts no daemon for each program, but puts what it needs into TMPDIR.
+        self.environment = dict(os.environ, OMPI_MCA_ess_singleton_isolated="1", TMPDIR=self.scratch)
+        self.tidy()
+
+    def tidy(self):
+        shutil.rmtree(self.directory, ignore_errors=True)
+        shutil.copytree(os.path.join(HERE, "bad_input"), self.directory)
+        os.mkdir(os.path.join(self.directory, "folder.prm"))
+        self.before = listing(self.directory)
+
+    def run(self, command, seconds):
+        """Exit code (None if it takes too long), standard output, standard error."""
         try:
-            run = subprocess.run([peat] + arguments, cwd=directory, capture_output=True, timeout=SECONDS)
+            run = subprocess.run(command, cwd=self.directory, env=self.environment, capture_output=True, timeout=seconds)
         except subprocess.TimeoutExpired:
-            return [f"takes more than {SECONDS} s"], ""
-        out, err = (text.decode("utf-8", "replace") for text in (run.stdout, run.stderr))
-        if run.returncode != 1:
-            found.append(f"signal {-run.returncode}" if run.returncode < 0 else f"exit code {run.returncode}, not 1")
-        if out:
-            found.append("something on standard output: " + out.splitlines()[0])
-        if not err.startswith("peat: ") or not err.endswith("\n") or len(err.splitlines()) != 1:
-            found.append("not one line 'peat: ...' on standard error")
-        if len(err) > LONGEST_LINE:
-            found.append(f"a message of {len(err)} characters")
-        if OURS.search(out + err):
-            found.append("our words: " + OURS.search(out + err).group(0))
-        found += [f"does not say {word!r}" for word in words if word not in err]
-        left = [path[len(directory) + 1:] for path in listing(directory) if path not in before]
+            return None, "", ""
+        return run.returncode, run.stdout.decode("utf-8", "replace"), run.stderr.decode("utf-8", "replace")
+
+    def left_behind(self):
+        """What is new; it is removed."""
+        left = [path[len(self.directory) + 1:] for path in listing(self.directory) if path not in self.before]
         if left:
-            found.append("leaves behind: " + ", ".join(left[:5]))
+            self.tidy()
+        return left
+
+    def remove(self):
+        shutil.rmtree(self.scratch, ignore_errors=True)
+
+
+def problems(workplace, command, words):
+    """What is wrong with the answer to a command, and what it said."""
+    code, out, err = workplace.run(command, SECONDS)
+    if code is None:
+        workplace.tidy()
+        return [f"takes more than {SECONDS} s"], ""
+    found = []
+    if code != 1:
+        found.append(f"signal {-code}" if code < 0 else f"exit code {code}, not 1")
+    if out:
+        found.append("something on standard output: " + out.splitlines()[0])
+    if not err.startswith("peat: ") or not err.endswith("\n") or len(err.splitlines()) != 1:
+        found.append("not one line 'peat: ...' on standard error")
+    if len(err) > LONGEST_LINE:
+        found.append(f"a message of {len(err)} characters")
+    if OURS.search(out + err):
+        found.append("our words: " + OURS.search(out + err).group(0))
+    found += [f"does not say {word!r}" for word in words if word not in err]
+    left = workplace.left_behind()
+    if left:
+        found.append("leaves behind: " + ", ".join(left[:5]))
     return found, err
 
 
-def good_files_pass(peat):
-    """The good files are good: otherwise the bad ones would prove nothing."""
+def good_files_pass(workplace, peat):
+    """The good files are good, or the bad ones would prove nothing; so are the complete parameters of a run."""
     passed = True
     for name in GOOD:
-        with tempfile.TemporaryDirectory(prefix="peat_bad_input_") as directory:
-            shutil.copytree(os.path.join(HERE, "bad_input"), directory, dirs_exist_ok=True)
-            commands = [["check", name], ["run", name, "--quiet"]]
-            # The complete parameters that a run writes are a good file again.
-            written = os.path.join("output", name[:-4], "parameters.prm")
-            again = os.path.join(directory, "again.prm")
-            for command in commands + [["check", "again.prm"]]:
-                if command[1] == "again.prm" and os.path.exists(os.path.join(directory, written)):
-                    shutil.copy(os.path.join(directory, written), again)
-                run = subprocess.run([peat] + command, cwd=directory, capture_output=True, timeout=60)
-                if run.returncode != 0 or run.stderr:
-                    passed = False
-                    print(f"FAILED  peat {' '.join(command)} ({name}): exit code {run.returncode}\n"
-                          f"        {run.stderr.decode('utf-8', 'replace').strip()}")
+        written = os.path.join(workplace.directory, "output", name[:-4], "parameters.prm")
+        for command in (["check", name], ["run", name, "--quiet"], ["check", "again.prm"]):
+            if os.path.exists(written):
+                shutil.copy(written, os.path.join(workplace.directory, "again.prm"))
+            code, _, err = workplace.run([peat] + command, 60)
+            if code != 0 or err:
+                passed = False
+                print(f"FAILED  peat {' '.join(command)} ({name}): exit code {code}\n        {err.strip()}")
+        workplace.tidy()
     return passed
 
 
@@ -159,7 +183,7 @@ def main():
         sys.exit(f"there is no program '{peat}'; use --peat")
 
     cases = []
-    for i, (name, arguments, words) in enumerate(cases_of_files(options.names)):
+    for i, (name, arguments, words) in enumerate(cases_of_files()):
         cases.append((name, ["run"] + arguments, words))
         if i % 6 == 0:
             cases.append((name + " (check)", ["check"] + arguments, words))
@@ -168,17 +192,29 @@ def main():
     if options.names:
         cases = [case for case in cases if any(name in case[0] for name in options.names)]
 
+    workplaces = queue.Queue()
+    for _ in range(options.jobs):
+        workplaces.put(Workplace())
+
+    def look_at(case):
+        workplace = workplaces.get()
+        try:
+            return problems(workplace, [peat] + case[1], case[2])
+        finally:
+            workplaces.put(workplace)
+
     n_failed = 0
     with ThreadPoolExecutor(options.jobs) as pool:
-        results = pool.map(lambda case: problems(peat, case[1], case[2]), cases)
-        for (name, arguments, _), (found, message) in zip(cases, results):
+        for (name, arguments, _), (found, message) in zip(cases, pool.map(look_at, cases)):
             n_failed += bool(found)
             if found or options.verbose:
                 print(f"{'FAILED' if found else 'ok    '}  {name}: peat {' '.join(arguments)}\n"
                       f"        {message.strip() or '(says nothing)'}")
                 for problem in found:
                     print("      - " + problem)
-    passed = bool(options.names) or good_files_pass(peat)
+    passed = bool(options.names) or good_files_pass(workplaces.queue[0], peat)
+    while not workplaces.empty():
+        workplaces.get().remove()
     print(f"{len(cases)} cases, {n_failed} failed")
     return 0 if passed and n_failed == 0 else 1
 

@@ -203,9 +203,87 @@ CellId Tracers<dim>::carrier(const Tracer &tracer, const ActiveNodes<dim> &nodes
 }
 
 template <int dim>
-void Tracers<dim>::locate(const ActiveNodes<dim> &nodes)
+void Tracers<dim>::set_weights(const CellId cell, const bool beyond_cell, const ActiveNodes<dim> &nodes,
+                               SurfacePoint<dim> &point) const
 {
   const unsigned int reach = nodes.nodes_per_direction();
+  const auto base = grid.lattice(cell);
+  std::array<int, dim> first;
+  point.N.fill(1.);
+  for (unsigned int d = 0; d < dim; ++d) {
+    const auto &planes = grid.planes(d);
+    int i = base[d];
+    if (beyond_cell && point.position[d] > planes[i + 1] && i + 1 < grid.n_cells(d))
+      ++i;
+    else if (beyond_cell && point.position[d] < planes[i] && i > 0)
+      --i;
+    first[d] = i - base[d] + (reach == 4 ? 1 : 0);
+    const double xi =
+        std::min(1., std::max(0., (point.position[d] - planes[i]) / (planes[i + 1] - planes[i])));
+    for (unsigned int v = 0; v < point.n_nodes; ++v)
+      point.N[v] *= (v >> d) & 1 ? xi : 1. - xi;
+  }
+  for (unsigned int v = 0; v < point.n_nodes; ++v) {
+    unsigned int local = 0;
+    for (int d = dim - 1; d >= 0; --d)
+      local = local * reach + first[d] + ((v >> d) & 1);
+    point.node[v] = nodes.cell_nodes(cell)[local];
+  }
+}
+
+template <int dim>
+void Tracers<dim>::settle(const Body<dim> &body, const ActiveNodes<dim> &nodes)
+{
+  const Layout &layout = body.layout();
+  const auto &slices = body.slices();
+  for (Tracer &tracer : list) {
+    unsigned int axis = 0;
+    for (unsigned int d = 1; d < dim; ++d)
+      if (std::abs(tracer.area[d]) > std::abs(tracer.area[axis]))
+        axis = d;
+    const double area = tracer.area.norm(), side = tracer.area[axis] > 0. ? 1. : -1.;
+    const CellId cell = carrier(tracer, nodes);
+    if (cell == no_index || std::abs(tracer.area[axis]) < 0.999 * area)
+      continue;
+    const auto slice = std::lower_bound(slices.begin(), slices.end(), cell,
+                                        [](const Slice &a, const CellId c) { return a.cell < c; });
+    if (slice == slices.end() || slice->cell != cell)
+      continue;
+
+    // The points below the piece: those nearest to it along the surface.
+    const auto distance = [&](const std::uint32_t handle) {
+      double largest = 0.;
+      for (unsigned int d = 0; d < dim; ++d)
+        if (d != axis)
+          largest =
+              std::max(largest, std::abs(body.position(handle)[d] - tracer.position[d]) / grid.size(cell, d));
+      return largest;
+    };
+    double nearest = std::numeric_limits<double>::max();
+    for (std::uint32_t i = slice->begin; i < slice->end; ++i)
+      nearest = std::min(nearest, distance(body.handles()[i]));
+    double edge = -std::numeric_limits<double>::max(), volume = 0.;
+    for (std::uint32_t i = slice->begin; i < slice->end; ++i) {
+      const std::uint32_t handle = body.handles()[i];
+      if (distance(handle) > nearest + 0.05)
+        continue;
+      const double *row = body.row(handle);
+      volume += row[layout.volume];
+      if (layout.extent >= 0)
+        edge = std::max(edge, side * body.position(handle)[axis] + row[layout.extent + axis]);
+    }
+    if (layout.extent >= 0)
+      tracer.position[axis] = side * edge;
+    else {
+      const double depth = std::min(grid.size(cell, axis), volume / area);
+      tracer.position[axis] = grid.lower(cell, axis) + (side > 0. ? depth : grid.size(cell, axis) - depth);
+    }
+  }
+}
+
+template <int dim>
+void Tracers<dim>::locate(const ActiveNodes<dim> &nodes)
+{
   carried.resize(list.size());
   carrier_cell.resize(list.size());
   for (std::size_t t = 0; t < list.size(); ++t) {
@@ -219,62 +297,41 @@ void Tracers<dim>::locate(const ActiveNodes<dim> &nodes)
       point.N.fill(0.);
       continue;
     }
-    // With four nodes per direction the cell's neighbours are within reach, and the piece acts where it is: a
-    // sliver of material beyond the last full cell then gets its share of the load. With two it acts at the
-    // cell's face.
-    const auto base = grid.lattice(cell);
-    std::array<int, dim> first;
-    point.N.fill(1.);
-    for (unsigned int d = 0; d < dim; ++d) {
-      const auto &planes = grid.planes(d);
-      int i = base[d];
-      if (reach == 4 && point.position[d] > planes[i + 1] && i + 1 < grid.n_cells(d))
-        ++i;
-      else if (reach == 4 && point.position[d] < planes[i] && i > 0)
-        --i;
-      first[d] = i - base[d] + (reach == 4 ? 1 : 0);
-      const double xi =
-          std::min(1., std::max(0., (point.position[d] - planes[i]) / (planes[i + 1] - planes[i])));
-      for (unsigned int v = 0; v < point.n_nodes; ++v)
-        point.N[v] *= (v >> d) & 1 ? xi : 1. - xi;
-    }
-    for (unsigned int v = 0; v < point.n_nodes; ++v) {
-      unsigned int local = 0;
-      for (int d = dim - 1; d >= 0; --d)
-        local = local * reach + first[d] + ((v >> d) & 1);
-      point.node[v] = nodes.cell_nodes(cell)[local];
-    }
+    set_weights(cell, nodes.nodes_per_direction() == 4, nodes, point);
   }
 }
 
 template <int dim>
 void Tracers<dim>::move(const std::vector<double> &velocity, const double dt, const bool stretch,
-                        const ActiveNodes<dim> &)
+                        const ActiveNodes<dim> &nodes)
 {
   for (std::size_t t = 0; t < list.size(); ++t) {
-    const SurfacePoint<dim> &point = carried[t];
-    for (unsigned int i = 0; i < point.n_nodes; ++i)
-      for (unsigned int d = 0; d < dim; ++d)
-        list[t].position[d] += dt * point.N[i] * velocity[std::size_t(point.node[i]) * dim + d];
-    if (!stretch || carrier_cell[t] == no_index)
+    const CellId cell = carrier_cell[t];
+    if (cell == no_index)
       continue;
-    // da_t = (div v I - (grad v)^T) da, with the gradient of the carrying cell.
+    // With the nodes of the carrying cell alone: those beyond may carry next to nothing.
+    SurfacePoint<dim> point = carried[t];
+    set_weights(cell, false, nodes, point);
     dealii::Tensor<2, dim> gradient;
-    for (unsigned int i = 0; i < point.n_nodes; ++i)
-      for (unsigned int e = 0; e < dim; ++e) {
-        double slope =
-            (i >> e) & 1 ? 1. / grid.size(carrier_cell[t], e) : -1. / grid.size(carrier_cell[t], e);
+    for (unsigned int i = 0; i < point.n_nodes; ++i) {
+      const double *v = &velocity[std::size_t(point.node[i]) * dim];
+      for (unsigned int d = 0; d < dim; ++d)
+        list[t].position[d] += dt * point.N[i] * v[d];
+      for (unsigned int e = 0; stretch && e < dim; ++e) {
+        double slope = ((i >> e) & 1 ? 1. : -1.) / grid.size(cell, e);
         for (unsigned int d = 0; d < dim; ++d)
           if (d != e) {
-            const double xi = std::min(1., std::max(0., (point.position[d] - grid.lower(carrier_cell[t], d)) /
-                                                            grid.size(carrier_cell[t], d)));
+            const double xi =
+                std::min(1., std::max(0., (point.position[d] - grid.lower(cell, d)) / grid.size(cell, d)));
             slope *= (i >> d) & 1 ? xi : 1. - xi;
           }
         for (unsigned int d = 0; d < dim; ++d)
-          gradient[d][e] += slope * velocity[std::size_t(point.node[i]) * dim + d];
+          gradient[d][e] += slope * v[d];
       }
-    const dealii::Tensor<1, dim> area = list[t].area;
-    list[t].area += dt * (dealii::trace(gradient) * area - dealii::transpose(gradient) * area);
+    }
+    // da_t = (div v I - (grad v)^T) da
+    if (stretch)
+      list[t].area += dt * (dealii::trace(gradient) * point.area - dealii::transpose(gradient) * point.area);
   }
 }
 

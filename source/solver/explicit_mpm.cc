@@ -184,8 +184,10 @@ const Surface<dim> &ExplicitMPM<dim>::surface(const Condition<dim> &condition) c
 template <int dim>
 void ExplicitMPM<dim>::add_loads()
 {
-  for (auto &[name, tracers] : scene.surfaces)
+  for (auto &[name, tracers] : scene.surfaces) {
+    tracers.settle(scene.body(name), active);
     tracers.locate(active);
+  }
   std::fill(nodal.force.begin(), nodal.force.end(), 0.);
   std::fill(nodal.pressure_load.begin(), nodal.pressure_load.end(), 0.);
   for (const auto &condition : scene.conditions)

@@ -11,23 +11,38 @@ struct Limits
   double wave = std::numeric_limits<double>::max();
   double diffusion = std::numeric_limits<double>::max();
   double combined = std::numeric_limits<double>::max();
-  double fill = 1.;
+  bool small_piece = false;
 };
 
-/// How much smaller than in a full cell the pieces of material are that a node may have to move alone: with
-/// GIMP the smallest domain of a point over half a cell, with Q1 the part of the cell that is filled.
+/// Factors by which slivers of material, which a node may have to move alone, reduce the limits of full
+/// cells.
+struct SliverFactors
+{
+  double wave;
+  double diffusion;
+  bool small_piece; ///< smaller than a point of a full cell
+};
+
+/// GIMP: a domain of half-length l that reaches over the surface's grid line adds up to c^2/(l h) to the
+/// largest squared frequency 4 c^2/h^2, whatever the length that sticks out, and likewise D/(l h) to the
+/// largest rate 4 D/h^2. Q1: fitted to the spectral radius of columns whose last cell is filled in part.
 template <int dim>
-double fill_of(const Body<dim> &body, const Slice &slice, const Grid<dim> &grid)
+SliverFactors sliver_factors(const Body<dim> &body, const Slice &slice, const Grid<dim> &grid)
 {
   const Layout &layout = body.layout();
-  double volume = 0., smallest = 1.;
+  double volume = 0., domain = 1.;
   for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
     const double *row = body.row(body.handles()[i]);
     volume += row[layout.volume];
     for (unsigned int d = 0; d < dim && layout.extent >= 0; ++d)
-      smallest = std::min(smallest, 4. * row[layout.extent + d] / grid.size(slice.cell, d));
+      domain = std::min(domain, 4. * row[layout.extent + d] / grid.size(slice.cell, d));
   }
-  return layout.extent >= 0 ? smallest : std::min(1., volume / grid.volume(slice.cell));
+  if (layout.extent >= 0)
+    return {1. / std::sqrt(1. + 1. / domain), 1. / (1. + 1. / domain), domain < 0.99};
+  const double fill = volume / grid.volume(slice.cell);
+  if (fill > 0.99)
+    return {1., 1., false};
+  return {std::min(1., 1.39 * std::sqrt(fill)), std::min(1., 1.95 * fill), true};
 }
 
 /// Stiffness and density at the fastest of a cell's points.
@@ -88,13 +103,14 @@ Limits limits(const Body<dim> &body, const Grid<dim> &grid, const bool seepage_i
     double h = std::numeric_limits<double>::max();
     for (unsigned int d = 0; d < dim; ++d)
       h = std::min(h, grid.size(slice.cell, d));
-    const double fill = fill_of(body, slice, grid);
+    const SliverFactors factors = sliver_factors(body, slice, grid);
     const Speeds fastest = speeds(body, slice, seepage_inertia);
-    const double c = fastest.wave / std::min(1., fill > 0.99 ? 1. : 1.39 * std::sqrt(fill));
-    const double D = fastest.diffusion / std::min(1., fill > 0.99 ? 1. : 1.95 * fill);
+    const double c = fastest.wave / factors.wave;
+    const double D = fastest.diffusion / factors.diffusion;
     const double dt = h * h / (D + std::sqrt(D * D + c * c * h * h));
     if (dt < result.combined)
-      result = {h / c, D > 0. ? h * h / (2. * D) : std::numeric_limits<double>::max(), dt, fill};
+      result = {h / c, D > 0. ? h * h / (2. * D) : std::numeric_limits<double>::max(), dt,
+                factors.small_piece};
   }
   return result;
 }
@@ -111,12 +127,12 @@ StableStep stable_step(const std::vector<std::unique_ptr<Body<dim>>> &bodies, co
     if (!(dt < result.dt))
       continue;
     // The rank that has the smallest step says what limits it.
-    const unsigned int code = (mine.diffusion < mine.wave ? 2 : 1) + (mine.fill < 0.99 ? 2 : 0);
+    const unsigned int code = (mine.diffusion < mine.wave ? 2 : 1) + (mine.small_piece ? 2 : 0);
     const unsigned int winner =
         dealii::Utilities::MPI::max(mine.combined == dt ? code : 0u, grid.communicator());
     result.dt = dt;
     result.limit = std::string(winner % 2 == 0 ? "pressure diffusion" : "wave") + " in '" + body->name() +
-                   "'" + (winner > 2 ? " (partly filled cell)" : "");
+                   "'" + (winner > 2 ? " (small piece of material)" : "");
   }
   return result;
 }

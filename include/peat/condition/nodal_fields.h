@@ -1,28 +1,12 @@
 #pragma once
 
 #include <peat/grid/active_nodes.h>
-
-#include <deal.II/base/tensor.h>
+#include <peat/grid/surface.h>
 
 #include <string>
 #include <vector>
 
 namespace peat {
-/// A piece of a body's surface: where it is, how large, and which nodes feel what acts on it.
-template <int dim>
-struct SurfacePoint
-{
-  static constexpr unsigned int n_nodes = 1 << dim;
-  dealii::Point<dim> initial_position;
-  dealii::Point<dim> position;
-  dealii::Tensor<1, dim> area; ///< outward normal times area [m^(dim-1)]
-  std::array<std::uint32_t, n_nodes> node;
-  std::array<double, n_nodes> N;
-};
-
-template <int dim>
-using Surface = std::vector<SurfacePoint<dim>>;
-
 /// What a step knows on the active nodes, one row a node; the columns of `sums` are those of the points'
 /// kernels.
 template <int dim>

@@ -1,8 +1,9 @@
 #pragma once
 
-#include <peat/condition/nodal_fields.h>
 #include <peat/grid/active_nodes.h>
 #include <peat/grid/shape.h>
+#include <peat/grid/surface.h>
+#include <peat/points/body.h>
 
 #include <vector>
 
@@ -29,6 +30,12 @@ public:
   /// cell and direction. Faces that lie on the edge of the mesh are left out.
   void cover(const Shape<dim> &shape, unsigned int pieces_per_direction);
 
+  /// Put pieces of surface that are normal to an axis where the body's points see its surface: at the edge of
+  /// the points' domains (GIMP), or as high in their cell as the volume of the points below fills it (Q1). A
+  /// uniform traction is then in balance with the same stress in every cell, also where material has just
+  /// entered a cell.
+  void settle(const Body<dim> &body, const ActiveNodes<dim> &nodes);
+
   /// Find for each tracer the nodes that carry it. A tracer whose own cell holds no material (the surface has
   /// risen a little above the grid line) is carried by the cell below it.
   void locate(const ActiveNodes<dim> &nodes);
@@ -45,6 +52,9 @@ public:
   void migrate();
 
 private:
+  /// Shape functions at the position; if not `beyond_cell`, at the point of this cell that is nearest to it.
+  void set_weights(CellId cell, bool beyond_cell, const ActiveNodes<dim> &nodes,
+                   SurfacePoint<dim> &point) const;
   CellId own_cell(const Tracer &tracer) const;
   CellId carrier(const Tracer &tracer, const ActiveNodes<dim> &nodes) const;
 
