@@ -75,7 +75,7 @@ def draw_points(axes, directory):
     flat = np.ptp(x[:, 2]) == 0
     across = x[:, 2 if flat else 1]
     front = across < across.min() + 0.02 * (np.ptp(across) or 1) + 1e-12 if not flat else np.ones(len(x), bool)
-    picture = axes.scatter(x[front, 0], x[front, 1 if flat else 2], c=value[front], s=6, marker="s", cmap="viridis", linewidths=0)
+    picture = axes.scatter(x[front, 0], x[front, 1 if flat else 2], c=value[front], s=10, marker="s", cmap="viridis", linewidths=0)
     axes.figure.colorbar(picture, ax=axes, label=label)
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
