@@ -638,7 +638,6 @@ CASES = {
     "S5_shear": (s5_shear, ("quick", "full"), 1),
     "P1": (p1, ("quick", "full"), 5),
     "P1_late": (p1_late, ("full",), 20),
-    "P1_fine": (lambda c: p1(c, sizes=(20, 40, 80)), ("full",), 60),
     "P1_3d": (p1_3d, ("full",), 10),
     "P2": (p2, ("quick", "full"), 4),
     "P2_soft_fluid": (p2_soft, ("full",), 2),

@@ -116,6 +116,19 @@ void ExplicitMPM<dim>::renumber_kept_velocity()
 }
 
 template <int dim>
+double ExplicitMPM<dim>::node_volume(const std::size_t node) const
+{
+  const auto lattice = grid.node_lattice(active.grid_node(node));
+  double volume = 1.;
+  for (unsigned int d = 0; d < dim; ++d) {
+    const auto &planes = grid.planes(d);
+    const int i = lattice[d], last = planes.size() - 1;
+    volume *= 0.5 * (planes[std::min(i + 1, last)] - planes[std::max(i - 1, 0)]);
+  }
+  return volume;
+}
+
+template <int dim>
 void ExplicitMPM<dim>::find_reference_masses()
 {
   if (steps_to_reference_masses-- > 0)
@@ -124,11 +137,15 @@ void ExplicitMPM<dim>::find_reference_masses()
   reference_mass.assign(active.size(), 0.);
   for (const CellId cell : active.occupied_cells()) {
     const std::uint32_t *cell_nodes = active.cell_nodes(cell);
-    double heaviest = 0.;
-    for (unsigned int v = 0; v < (1u << dim); ++v)
-      heaviest = std::max(heaviest, nodal.sums[std::size_t(cell_nodes[active.own_node(v)]) * nodal.n_sums]);
+    // By mass per volume of the mesh around a node, so that nodes on the mesh's faces are as heavy as others.
+    double densest = 0.;
+    for (unsigned int v = 0; v < (1u << dim); ++v) {
+      const std::uint32_t i = cell_nodes[active.own_node(v)];
+      densest = std::max(densest, nodal.sums[std::size_t(i) * nodal.n_sums] / node_volume(i));
+    }
     for (unsigned int i = 0; i < active.nodes_per_cell(); ++i)
-      reference_mass[cell_nodes[i]] = std::max(reference_mass[cell_nodes[i]], heaviest);
+      reference_mass[cell_nodes[i]] =
+          std::max(reference_mass[cell_nodes[i]], densest * node_volume(cell_nodes[i]));
   }
   active.max_over_ranks(reference_mass.data(), 1);
 }

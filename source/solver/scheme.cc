@@ -5,7 +5,7 @@
 namespace peat {
 SchemeParameters::SchemeParameters(Section section)
 {
-  std::string basis_name = "gimp", transfer = "dflip", update = "auto";
+  std::string basis_name = "gimp", transfer = "flip", update = "auto";
   section.add(
       "Basis", basis_name, {"q1", "gimp"},
       "Shape functions of the points. 'q1': FE_Q(1), cheapest, for points that stay in their cells. 'gimp': "
@@ -15,7 +15,8 @@ SchemeParameters::SchemeParameters(Section section)
       "How velocities go from points to nodes and back. 'flip': points add the grid's acceleration. 'dflip': "
       "the "
       "same, but nodes keep their velocity and take up only how the points differ from it, which removes the "
-      "dispersion of FLIP. 'pic': points take the grid's velocity; damps strongly.");
+      "dispersion of FLIP: for waves of small amplitude, not for bodies that fly or turn. 'pic': points take "
+      "the grid's velocity; damps strongly.");
   section.add("Stress update", update, {"auto", "usl", "musl"},
               "When stresses follow the velocities. 'usl': from the nodes' new velocities, cheapest. 'musl': "
               "from the "

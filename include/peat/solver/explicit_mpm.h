@@ -86,6 +86,8 @@ private:
   void resize_fields();
   void renumber_kept_velocity();
   void find_reference_masses();
+  /// Half of the cells of the mesh on either side, in every direction [m^dim].
+  double node_volume(std::size_t node) const;
   void keep_velocities();
   bool is_small(std::size_t node) const;
   dealii::Tensor<1, dim> total_momentum() const;
@@ -107,7 +109,7 @@ private:
   /// What nodes keep of their velocity from step to step, rows of dim + 1 as Kernels::scatter() takes them;
   /// empty if nodes keep nothing.
   std::vector<double> kept_velocity;
-  /// Mass of the heaviest node of the cells that a node belongs to [kg].
+  /// Mass that a node would have if it were as densely filled as the fullest node of its cells [kg].
   std::vector<double> reference_mass;
   unsigned int steps_to_reference_masses = 0;
   /// Nodes and components on impermeable faces of the mesh.
