@@ -382,13 +382,13 @@ def s5_rigid_motion(c):
     centre, momentum = (s["center x"][-1], s["center y"][-1]), (s["momentum x"][-1], s["momentum y"][-1])
     spin -= centre[0] * momentum[1] - centre[1] * momentum[0]
     start = s["mass"][0] * 0.437**2 / 6. * 6.2831853
-    # Not good, and bounded here only so that it gets no worse: at the edge of a body the momenta of nodes and of points
-    # differ a little, and a block of four cells loses spin to the lumped transfer.
-    c.below("rotating: center of mass", math.hypot(centre[0] - 3.51, centre[1] - 1.533), 3e-4)
+    # FLIP on a block of four cells: energy and spin go to what the lumped nodes do not see. Not good; the bounds only
+    # keep it from getting worse.
+    c.below("rotating: center of mass", math.hypot(centre[0] - 3.51, centre[1] - 1.533), 1e-12)
     c.below("rotating: momentum", run.summary["balance"]["momentum"], 1e-13)
-    c.below("rotating: energy gained or lost", abs(energy[-1] / energy[0] - 1.), 3e-2)
+    c.below("rotating: energy gained or lost", abs(energy[-1] / energy[0] - 1.), 4e-2)
     # The exact start is that of the block; points have it but for (h/2a)^2 of the spin of their own parts.
-    c.below("rotating: angular momentum", abs(spin / start - 1.), 0.45)
+    c.below("rotating: angular momentum", abs(spin / start - 1.), 0.25)
 
 
 def s5_rotation(c):
