@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Pictures of an output directory without ParaView: plot.py DIR writes DIR/overview.png.
 
 Shows pore pressure (or vertical stress) at the points when it was largest, and the probes over time.

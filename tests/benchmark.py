@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Throughput of the explicit step, beside the machine's memory bandwidth: tests/benchmark.py [--peat build/peat].
 
 Runs prm/benchmarks/block_dry.prm and block_saturated.prm (512,000 points in 3-D, 8 points a cell) on one core for each
