@@ -28,7 +28,6 @@ struct BodyParameters
   Function initial_velocity;
   Function initial_stress;
   Function initial_pressure;
-  std::string from_stage;
 };
 
 /// Points of one cell: `handles[begin ... end)` in the order of Body::handles().

@@ -74,8 +74,8 @@ inline void evaluate_direction(const Lanes x, const Lanes half_extent, const Cel
     const Lanes from = max(lower, broadcast(plane[c]));
     const Lanes to = max(from, min(upper, broadcast(plane[c + 1])));
     const Lanes share = (to - from) * inverse_length;
-    // In this form a part of a few units of round-off has values that belong to its slopes: the mass and the force that a
-    // node gets from it are those of one and the same sliver.
+    // In this form a part of a few units of round-off has values that belong to its slopes: the mass and the
+    // force that a node gets from it are those of one and the same sliver.
     const Lanes xi = ((from - plane[c]) + 0.5 * (to - from)) * inverse;
     w.value[c] += share * (1. - xi);
     w.value[c + 1] += share * xi;
