@@ -501,7 +501,7 @@ def d3_3d(c):
     flat = c.run("D3_ramp", {"Constants/cells": 20, "Constants/End": 0.2, "References/pressure/Times": "0.03, 0.1, 0.2",
                              "References/pressure/Columns": "p(t=0.03 s) [Pa], p(t=0.1 s) [Pa], p(t=0.2 s) [Pa]"})
     for a, b, t in zip(run.errors_at_times("pressure"), flat.errors_at_times("pressure"), (0.03, 0.1, 0.2)):
-        # Equal up to the rounding of the steps to the times of output, which matters most while the load rises.
+        # The third dimension should not take part at all. Measured: up to 8 % at 0.03 s; the cause is not known.
         c.below("error of the pressure at %g s against 2-D" % t, abs(a / b - 1.), 0.1)
     c.below("pressure at the base, Linf", run.error("pressure at the base", "Linf"), 1e-2)
 
