@@ -46,6 +46,18 @@ public:
     }
   }
 
+  dealii::Tensor<1, dim> force(const SurfacePoint<dim> &point, const double t) const override
+  {
+    dealii::Tensor<1, dim> result;
+    if (!this->place.contains(point))
+      return result;
+    double x[3];
+    coordinates(point.position, x);
+    for (unsigned int d = 0; d < dim; ++d)
+      result[d] = point.area.norm() * value.value(x, t, d);
+    return result;
+  }
+
 private:
   Function value;
 };
@@ -67,6 +79,8 @@ public:
           "a pressure acts on whole faces of the mesh; 'Region' can restrict it on a body's surface");
   }
   bool concerns_fluid() const override { return true; }
+  typename Condition<dim>::Fluid fluid() const override { return Condition<dim>::Fluid::pressure; }
+  double fluid_value(const double *x, const double t) const override { return value.value(x, t); }
   std::vector<unsigned int> opened_boundaries() const override { return this->place.boundaries; }
 
   void add_loads(const ActiveNodes<dim> &nodes, const Surface<dim> &surface,
@@ -134,6 +148,8 @@ public:
       section.fail("Where", "a flux acts on faces of the mesh");
   }
   bool concerns_fluid() const override { return true; }
+  typename Condition<dim>::Fluid fluid() const override { return Condition<dim>::Fluid::flux; }
+  double fluid_value(const double *x, const double t) const override { return value.value(x, t); }
 
   void constrain_flux(const ActiveNodes<dim> &nodes, const Surface<dim> &,
                       NodalFields<dim> &fields) const override
@@ -162,6 +178,7 @@ public:
       section.fail("Where", "'impermeable' acts on faces of the mesh or on the surface of a body");
   }
   bool concerns_fluid() const override { return true; }
+  typename Condition<dim>::Fluid fluid() const override { return Condition<dim>::Fluid::impermeable; }
 
   void constrain_flux(const ActiveNodes<dim> &, const Surface<dim> &surface,
                       NodalFields<dim> &fields) const override

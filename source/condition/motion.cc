@@ -126,6 +126,11 @@ public:
       velocity[row + d] = velocity_during(x, end_time - dt, dt, d);
     });
   }
+  double displacement_increment(const double *x, const double t, const double dt,
+                                const unsigned int d) const override
+  {
+    return dt * velocity_during(x, t, dt, d);
+  }
 
 protected:
   /// The velocity that holds in the step from t to t + dt.
@@ -162,6 +167,16 @@ protected:
                          const unsigned int d) const override
   {
     return this->value.value(x, t + dt, d);
+  }
+
+public:
+  /// Simpson's rule: steps of an implicit solver are long.
+  double displacement_increment(const double *x, const double t, const double dt,
+                                const unsigned int d) const override
+  {
+    return dt / 6. *
+           (this->value.value(x, t, d) + 4. * this->value.value(x, t + 0.5 * dt, d) +
+            this->value.value(x, t + dt, d));
   }
 };
 const ConditionMember<PrescribedVelocity> velocity("velocity", "a given velocity.");

@@ -10,6 +10,7 @@ public:
   explicit LinearElastic(const Section &section) : moduli(section) {}
 
   bool finite_strain() const override { return false; }
+  bool is_linear() const override { return true; }
 
   void update(const GradientLanes &increment, StressLanes &stress, Lanes *) const override
   {

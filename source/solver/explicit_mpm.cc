@@ -17,6 +17,13 @@ bool Scene<dim>::is_saturated() const
 }
 
 template <int dim>
+bool Scene<dim>::has_body_force() const
+{
+  return std::any_of(conditions.begin(), conditions.end(),
+                     [](const auto &condition) { return condition->has_body_force(); });
+}
+
+template <int dim>
 dealii::types::particle_index Scene<dim>::n_global_points() const
 {
   dealii::types::particle_index n = 0;
@@ -38,7 +45,7 @@ template <int dim>
 ExplicitMPM<dim>::ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &scene,
                               const double start_time, const Ledger<dim> &carried)
     : scheme(scheme), grid(grid), scene(scene), saturated(scene.is_saturated()),
-      has_loads(!scene.surfaces.empty()), active(grid, static_cast<unsigned int>(scheme.basis)),
+      has_loads(!scene.surfaces.empty() || scene.has_body_force()), active(grid, static_cast<unsigned int>(scheme.basis)),
       now(start_time), book(carried)
 {
   for (const auto &body : scene.bodies) {

@@ -69,6 +69,27 @@ public:
   /// Whether it prescribes this component of the motion on a mesh face. Only one condition may.
   virtual bool prescribes(unsigned int /*boundary*/, unsigned int /*component*/) const { return false; }
 
+  // What an implicit solver asks, which has other nodes than an explicit step. `x` are three coordinates.
+
+  /// Displacement [m] in the time from t to t + dt of a component that it prescribes.
+  virtual double displacement_increment(const double * /*x*/, double /*t*/, double /*dt*/,
+                                        unsigned int /*component*/) const
+  {
+    return 0.;
+  }
+  /// Force [N] on a piece of a body's surface.
+  virtual dealii::Tensor<1, dim> force(const SurfacePoint<dim> &, double /*t*/) const { return {}; }
+  /// Force per mass [m/s^2] on the material at x.
+  virtual dealii::Tensor<1, dim> body_force(const dealii::Point<dim> & /*x*/, double /*t*/) const { return {}; }
+  virtual bool has_body_force() const { return false; }
+  /// Volume of fluid that is produced per volume and time [1/s] at x.
+  virtual double fluid_source(const dealii::Point<dim> & /*x*/, double /*t*/) const { return 0.; }
+  virtual bool has_fluid_source() const { return false; }
+  /// What the pore fluid meets at its place, with the value of it: a pressure [Pa] or a flux outwards [m/s].
+  enum class Fluid { free, pressure, flux, impermeable };
+  virtual Fluid fluid() const { return Fluid::free; }
+  virtual double fluid_value(const double * /*x*/, double /*t*/) const { return 0.; }
+
   const Section section;
   const Place<dim> place;
   const std::string name;

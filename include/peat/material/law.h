@@ -40,6 +40,9 @@ public:
   /// volume at the start.
   virtual bool finite_strain() const = 0;
 
+  /// Whether the tangent is the same for every stress and state.
+  virtual bool is_linear() const { return false; }
+
   /// Advance one step. `increment` is the displacement gradient of the step, dt * grad v, referred to the
   /// positions at its start; `stress` and `state` (one Lanes per component, fields in the order of state())
   /// are updated in place. Lanes that hold no point carry zero increments and the state of a valid point.

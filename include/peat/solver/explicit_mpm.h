@@ -42,6 +42,7 @@ struct Scene
   Function gravity;
 
   bool is_saturated() const;
+  bool has_body_force() const;
   dealii::types::particle_index n_global_points() const;
   Body<dim> &body(const std::string &name) const;
 };

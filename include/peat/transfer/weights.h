@@ -54,6 +54,20 @@ inline void evaluate_direction(const Lanes x, const Lanes /*half_extent*/, const
   w.slope[0] = broadcast(-inverse);
 }
 
+/// FE_Q(2) with its nodes at 0, 1/2 and 1: of finite elements; for points its values are not all positive.
+inline void evaluate_direction(const Lanes x, const Lanes /*half_extent*/, const CellInterval &cell,
+                               DirectionWeights<3> &w)
+{
+  const double inverse = 1. / cell.size;
+  const Lanes xi = (x - cell.lower) * inverse;
+  w.value[0] = (1. - xi) * (1. - 2. * xi);
+  w.value[1] = 4. * xi * (1. - xi);
+  w.value[2] = xi * (2. * xi - 1.);
+  w.slope[0] = (4. * xi - 3.) * inverse;
+  w.slope[1] = (4. - 8. * xi) * inverse;
+  w.slope[2] = (4. * xi - 1.) * inverse;
+}
+
 /// GIMP on FE_Q(1): the point's domain [x - l, x + l] is cut by the cell faces; each part acts as one Q1
 /// point of its cell, placed at the part's middle. What sticks out of the mesh is cut off.
 inline void evaluate_direction(const Lanes x, const Lanes half_extent, const CellInterval &cell,

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <peat/condition/condition.h>
+#include <peat/points/body.h>
+#include <peat/solver/space.h>
+
+#include <deal.II/lac/affine_constraints.h>
+#include <deal.II/lac/trilinos_block_sparse_matrix.h>
+#include <deal.II/lac/trilinos_parallel_block_vector.h>
+
+#include <memory>
+
+namespace peat {
+using BlockMatrix = dealii::TrilinosWrappers::BlockSparseMatrix;
+using BlockVector = dealii::TrilinosWrappers::MPI::BlockVector;
+
+/// At which time, and by which combination of old and new values, the equations hold in a step from t_n. With
+/// the unknowns U (displacement since t_n) and P (pressure at the end of the step)
+///   u - u_n = share U,                     p   = (1 - share) p_n + share P,
+///   v = velocity U + v_history,            p_t = pressure_rate (P - p_n) + rate_history,
+///   a = acceleration U + a_history.
+/// All rates zero: a static state.
+struct TimeLevel
+{
+  double time = 0.; ///< of the loads [s]
+  double share = 1.;
+  double velocity = 0.;      ///< [1/s]
+  double acceleration = 0.;  ///< [1/s^2]
+  double pressure_rate = 0.; ///< [1/s]
+  double dt = 0.;            ///< [s]
+  bool seepage_inertia = true;
+
+  /// The fluid's rows are multiplied by this, which makes the system symmetric but for the term rho_f a.
+  double fluid_scale() const { return velocity > 0. ? -share / velocity : -1.; }
+};
+
+/// The nodal values that a step works with; vectors with ghosts. Blocks: displacement, pressure.
+struct StepState
+{
+  BlockVector unknown;      ///< U [m], P [Pa]
+  BlockVector rate_history; ///< v_history [m/s], rate_history [Pa/s]
+  BlockVector second_history; ///< a_history [m/s^2]; the pressure block is p_n [Pa]
+};
+
+/// What the points take from the fluid and the skeleton in a step; one rank's share.
+struct StepWork
+{
+  double seepage_dissipation = 0.; ///< [J]
+  double seepage_work = 0.;        ///< [J], see Ledger
+  double fluid_squeezed = 0.;      ///< [m^dim]
+  bool finite = true;
+};
+
+/// Sources other than surfaces: gravity, body forces and fluid sources.
+template <int dim>
+struct VolumeLoads
+{
+  dealii::Tensor<1, dim> gravity; ///< [m/s^2]
+  std::vector<const Condition<dim> *> forces, fluids;
+};
+
+/// The weak form of the u-p equations (theory.md, eqs. 2 and 3) as sums over points with weights in cells:
+/// Gauss points make it the finite element method, material points the implicit material point method.
+///
+///   0 = sum V [ - (sigma'' - alpha p I) grad N_i + rho (g - a) N_i ] + surface forces
+///   0 = sum V [ - (p_t/Q + alpha div v) N_i + kappa R . grad N_i ] - outflow,   R = - grad p + rho_f (g - a)
+///
+/// Stresses come from the points' own, which are those at t_n, and the gradient of share U. The storage term
+/// takes p_n from the points, too: they carry the pressure, and nothing is lost where they move.
+template <int dim>
+class UpForm
+{
+public:
+  virtual ~UpForm() = default;
+  static std::unique_ptr<UpForm> make(const Space<dim> &space);
+
+  /// Add the body's part of the residual (right side minus left side, without regard to constraints), and, if
+  /// `matrix` is not null, of the matrix (minus the residual's derivative, constrained). Pressures act with
+  /// their means over cells where the space has no pressure for a saturated body.
+  virtual void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
+                        const VolumeLoads<dim> &loads, double stabilisation,
+                        const dealii::AffineConstraints<double> &constraints, BlockVector &residual,
+                        BlockMatrix *matrix) = 0;
+
+  /// Take the step: stress, state, pressure, displacement and velocity of the points from the unknowns and the
+  /// velocity at its end (in `end_velocity`); with `move`, also positions, volumes and extents.
+  virtual void update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
+                             const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity, bool move,
+                             StepWork &work) = 0;
+
+  /// Add sum m N_i v of the points, and sum m N_i N_j (if `matrix` is not null), to project velocities.
+  virtual void project_velocity(const Body<dim> &body, const dealii::AffineConstraints<double> &constraints,
+                                BlockVector &momentum, BlockMatrix *matrix) = 0;
+};
+} // namespace peat
