@@ -8,40 +8,6 @@
 
 namespace peat {
 template <int dim>
-bool Scene<dim>::is_saturated() const
-{
-  for (const auto &body : bodies)
-    if (body->material().mixture())
-      return true;
-  return false;
-}
-
-template <int dim>
-bool Scene<dim>::has_body_force() const
-{
-  return std::any_of(conditions.begin(), conditions.end(),
-                     [](const auto &condition) { return condition->has_body_force(); });
-}
-
-template <int dim>
-dealii::types::particle_index Scene<dim>::n_global_points() const
-{
-  dealii::types::particle_index n = 0;
-  for (const auto &body : bodies)
-    n += body->n_global_points();
-  return n;
-}
-
-template <int dim>
-Body<dim> &Scene<dim>::body(const std::string &name) const
-{
-  for (const auto &body : bodies)
-    if (body->name() == name)
-      return *body;
-  throw InputError("there is no body '" + name + "'");
-}
-
-template <int dim>
 ExplicitMPM<dim>::ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &scene,
                               const double start_time, const Ledger<dim> &carried)
     : scheme(scheme), grid(grid), scene(scene), saturated(scene.is_saturated()),
@@ -468,8 +434,6 @@ StableStep ExplicitMPM<dim>::stable_step() const
   return peat::stable_step<dim>(scene.bodies, grid, scheme.seepage_inertia);
 }
 
-template struct Scene<2>;
-template struct Scene<3>;
 template class ExplicitMPM<2>;
 template class ExplicitMPM<3>;
 } // namespace peat

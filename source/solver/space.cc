@@ -152,28 +152,37 @@ void Space<dim>::make_displacement_tables(const std::vector<CellId> &solid)
       node_list.push_back(node);
     }
   }
+  find_vertices();
   if (kind == Nodes::gimp)
     make_patches(solid);
 }
 
 template <int dim>
-void Space<dim>::make_patches(const std::vector<CellId> &solid)
+void Space<dim>::find_vertices()
 {
-  const unsigned int n_grid_nodes = background.locally_relevant_nodes().n_elements();
-  std::vector<std::uint32_t> node_at(n_grid_nodes, no_index);
+  vertex_node.assign(background.locally_relevant_nodes().n_elements(), no_index);
   for (std::size_t i = 0; i < node_list.size(); ++i) {
     auto lattice = background.locate(node_list[i].position);
-    for (unsigned int d = 0; d < dim; ++d)
+    bool is_vertex = true;
+    for (unsigned int d = 0; d < dim; ++d) {
       if (node_list[i].position[d] >= background.planes(d).back())
         lattice[d] = background.n_cells(d);
-    node_at[background.node_at(lattice)] = i;
+      is_vertex = is_vertex && node_list[i].position[d] == background.planes(d)[lattice[d]];
+    }
+    if (is_vertex)
+      vertex_node[background.node_at(lattice)] = i;
   }
+}
+
+template <int dim>
+void Space<dim>::make_patches(const std::vector<CellId> &solid)
+{
   for (std::size_t s = 0; s < solid.size(); ++s)
     for (unsigned int i = 0; i < n_nodes; ++i) {
       auto lattice = background.lattice(solid[s]);
       for (unsigned int d = 0, rest = i; d < dim; ++d, rest /= 4)
         lattice[d] = std::max(0, std::min(lattice[d] - 1 + int(rest % 4), background.n_cells(d)));
-      const Node &node = node_list[node_at[background.node_at(lattice)]];
+      const Node &node = *node_at(background.node_at(lattice));
       std::copy(node.displacement.begin(), node.displacement.end(),
                 &displacement_table[(s * n_nodes + i) * dim]);
     }

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <peat/condition/condition.h>
-#include <peat/points/body.h>
-#include <peat/points/tracers.h>
+#include <peat/solver/scene.h>
 #include <peat/solver/scheme.h>
+#include <peat/solver/solver.h>
 #include <peat/solver/time_step.h>
 #include <peat/transfer/kernels.h>
 
@@ -15,41 +14,9 @@
 #include <vector>
 
 namespace peat {
-/// What has gone into the bodies since the start; one rank's share until it is summed over the ranks.
-template <int dim>
-struct Ledger
-{
-  double external_work = 0.;       ///< of tractions, gravity, prescribed motion and local damping [J]
-  double gravity_work = 0.;        ///< of gravity alone [J]
-  double seepage_dissipation = 0.; ///< integral of |w|^2 / kappa [J]
-  double seepage_work = 0.;  ///< all that Darcy's law takes from the fluid's energy p^2 / (2 Q), negative [J]
-  double fluid_outflow = 0.; ///< of pore fluid through the boundaries [m^dim]
-  double fluid_squeezed =
-      0.; ///< pore volume lost by compression that V n does not show (small strain) [m^dim]
-  dealii::Tensor<1, dim> impulse; ///< of all external forces and local damping [N s]
-  double gross_impulse = 0.;      ///< integral of the sum of the external forces' magnitudes on nodes [N s]
-};
-
-/// The bodies, the conditions on them and the tracers that move with them: what a stage of a run works on.
-template <int dim>
-struct Scene
-{
-  std::vector<std::unique_ptr<Body<dim>>> bodies;
-  std::vector<std::unique_ptr<Condition<dim>>> conditions;
-  /// Surfaces on which conditions act, by body.
-  std::map<std::string, Tracers<dim>> surfaces;
-  std::unique_ptr<Tracers<dim>> probes;
-  Function gravity;
-
-  bool is_saturated() const;
-  bool has_body_force() const;
-  dealii::types::particle_index n_global_points() const;
-  Body<dim> &body(const std::string &name) const;
-};
-
 /// The explicit coupled material point method in the u-p form. step() is its table of contents.
 template <int dim>
-class ExplicitMPM
+class ExplicitMPM : public Solver<dim>
 {
 public:
   /// `carried` is the ledger of the stages before.
@@ -63,13 +30,12 @@ public:
   void step(double dt);
 
   StableStep stable_step() const;
-  double time() const { return now; }
-  /// Correct the round-off of many small steps, where the time is known.
-  void set_time(const double time) { now = time; }
+  double time() const override { return now; }
+  void set_time(const double time) override { now = time; }
   double largest_speed() const { return findings.largest_speed; }
-  const ActiveNodes<dim> &nodes() const { return active; }
-  const NodalFields<dim> &fields() const { return nodal; }
-  const Ledger<dim> &ledger() const { return book; }
+  const ActiveNodes<dim> &nodes() const override { return active; }
+  const NodalFields<dim> &fields() const override { return nodal; }
+  const Ledger<dim> &ledger() const override { return book; }
 
 private:
   // The stages of a step, in the order of the equations.

@@ -70,6 +70,11 @@ public:
   };
   /// Displacement nodes whose unknowns this rank knows of.
   const std::vector<Node> &displacement_nodes() const { return node_list; }
+  /// The displacement node at a vertex of the mesh; null where there is none.
+  const Node *node_at(const NodeId vertex) const
+  {
+    return vertex_node[vertex] == no_index ? nullptr : &node_list[vertex_node[vertex]];
+  }
   struct PressureNode
   {
     dealii::Point<dim> position;
@@ -88,6 +93,7 @@ private:
   void number(dealii::DoFHandler<dim> &handler, const dealii::hp::FECollection<dim> &elements,
               const std::vector<char> &active, unsigned int block);
   void make_displacement_tables(const std::vector<CellId> &solid);
+  void find_vertices();
   void make_patches(const std::vector<CellId> &solid);
   void make_pressure_tables(const std::vector<CellId> &saturated);
 
@@ -103,6 +109,7 @@ private:
   std::vector<std::uint32_t> slot, pressure_slot;
   std::vector<Index> displacement_table, pressure_table;
   std::vector<Node> node_list;
+  std::vector<std::uint32_t> vertex_node; ///< by NodeId
   std::vector<PressureNode> pressure_node_list;
 };
 } // namespace peat

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <peat/solver/scene.h>
+#include <peat/solver/implicit_parameters.h>
+#include <peat/solver/up_form.h>
+
+#include <deal.II/lac/affine_constraints.h>
+
+#include <vector>
+
+namespace peat {
+/// What the conditions of a scene mean for the unknowns of a Space: which are prescribed, and what acts on the
+/// bodies' surfaces and the mesh's faces.
+///
+/// On faces of the mesh nothing passes unless a condition says so. On a saturated body's own surface, where no
+/// other saturated body lies behind it, the pressure is zero unless a condition says otherwise: prescribed at
+/// nodes where the surface runs along a face of cells, and by a penalty where it cuts cells.
+template <int dim>
+class UpBoundary
+{
+public:
+  UpBoundary(const Space<dim> &space, const Scene<dim> &scene, double penalty);
+
+  /// Find prescribed unknowns and the carriers of surface pieces; the surfaces are settled and located.
+  /// `unused` are unknowns of this rank that nothing holds. Collective.
+  void locate(const ActiveNodes<dim> &active, const std::vector<typename Space<dim>::Index> &unused);
+
+  const dealii::AffineConstraints<double> &constraints() const { return homogeneous; }
+  bool prescribes_pressure() const { return any_pressure; }
+
+  /// Set the prescribed displacements since `start` and pressures at `end` in a vector of this rank's unknowns.
+  void prescribe(double start, double end, BlockVector &unknown) const;
+
+  /// Add surface forces, fluxes and penalties.
+  void assemble(const TimeLevel &level, const StepState &state, BlockVector &residual, BlockMatrix *matrix);
+
+  /// What was prescribed holds against: sums over this rank's prescribed unknowns of the residual there.
+  struct Reactions
+  {
+    double work = 0.;               ///< on the motion U [J]
+    dealii::Tensor<1, dim> force;   ///< [N]
+    double gross_force = 0.;        ///< [N]
+    double outflow = 0.;            ///< [m^dim/s]
+  };
+  Reactions reactions(const TimeLevel &level, const BlockVector &residual, const BlockVector &unknown) const;
+  /// The same of the surface forces and fluxes of the last assemble().
+  const Reactions &loads() const { return acting; }
+
+private:
+  using Index = typename Space<dim>::Index;
+  struct Motion
+  {
+    Index unknown;
+    unsigned int component;
+    dealii::Point<dim> position;
+    const Condition<dim> *condition; ///< nullptr: nothing moves it
+  };
+  struct GivenPressure
+  {
+    Index unknown;
+    dealii::Point<dim> position;
+    const Condition<dim> *condition; ///< nullptr: zero
+  };
+  /// A piece of a body's surface: its carrier's unknowns, and how the pressure is prescribed on it.
+  struct Piece
+  {
+    SurfacePoint<dim> point;
+    const Body<dim> *body;
+    std::vector<Index> displacement; ///< of component 0
+    std::vector<double> N;
+    bool weak_pressure = false;
+    const Condition<dim> *pressure = nullptr;
+    CellId cell;
+    std::array<double, Space<dim>::n_pressures> M;
+  };
+
+  void find_motions();
+  void find_mesh_pressures();
+  void find_pieces(const ActiveNodes<dim> &active);
+  void carry(const ActiveNodes<dim> &active, Piece &piece) const;
+  void find_pressure(Piece &piece);
+  bool is_covered(const Piece &piece) const;
+  void prescribe_face(const Piece &piece, unsigned int axis);
+  void share_pressures();
+  void add_surface_forces(const TimeLevel &level, const StepState &state, BlockVector &residual);
+  void add_fluxes(const TimeLevel &level, BlockVector &residual);
+  void add_penalties(const TimeLevel &level, const StepState &state, BlockVector &residual,
+                     BlockMatrix *matrix);
+
+  const Space<dim> &space;
+  const Grid<dim> &grid;
+  const Scene<dim> &scene;
+  const double penalty;
+  dealii::AffineConstraints<double> homogeneous;
+  std::vector<Motion> motions;
+  std::vector<GivenPressure> pressures;
+  std::vector<Piece> pieces;
+  bool any_pressure = false;
+  Reactions acting;
+};
+} // namespace peat

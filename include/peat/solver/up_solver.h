@@ -1,0 +1,130 @@
+#pragma once
+
+#include <peat/solver/implicit_parameters.h>
+#include <peat/solver/scene.h>
+#include <peat/solver/solver.h>
+#include <peat/solver/up_boundary.h>
+#include <peat/solver/up_form.h>
+#include <peat/solver/linear_solver.h>
+#include <peat/solver/time_step.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace peat {
+/// The u-p equations solved implicitly, with the points of a scene's bodies as quadrature: with Gauss points
+/// the finite element method, with material points the implicit material point method, whose points then move.
+///
+/// A step is: level of time, Newton's iterations, new rates, points. Points carry stress, history and pressure;
+/// velocities, accelerations and the rates of pressures live on nodes.
+template <int dim>
+class UpSolver : public Solver<dim>
+{
+public:
+  /// How the scene's points are used.
+  enum class Method {
+    finite_elements, ///< Gauss points, which stay where they are
+    material_points  ///< material points with the basis of the explicit method; quasi-static and static only
+  };
+
+  UpSolver(const ImplicitParameters &parameters, const LinearSolverParameters &linear, Method method,
+           Nodes displacement, bool seepage_inertia, const Grid<dim> &grid, Scene<dim> &scene,
+           double start_time, const Ledger<dim> &carried = {});
+  ~UpSolver();
+
+  /// Number the unknowns and what depends on them. Collective.
+  void prepare();
+
+  /// What is wanted next of a run of steps.
+  enum class Mode { dynamic, quasi_static };
+  /// Begin a stage: rates at rest, or, for dynamics, from the points' velocities and the equations.
+  void start(Mode mode);
+  /// Step that the solver would take next, and why.
+  StableStep suggested_step() const;
+  /// Advance by one step, not beyond `latest`; a quasi-static step may turn out shorter than suggested. Returns
+  /// its length. Throws NumericalError on every rank if it does not converge or a number is not finite.
+  double step(double latest);
+
+  /// The state of equilibrium and of steady seepage under the loads at the present time. Points take it, time
+  /// does not pass.
+  void solve_static();
+
+  /// Take displacements from where the bodies are now.
+  void reset_displacements();
+
+  double time() const override { return now; }
+  void set_time(const double time) override { now = time; }
+  const ActiveNodes<dim> &nodes() const override { return active; }
+  const NodalFields<dim> &fields() const override { return nodal; }
+  const Ledger<dim> &ledger() const override { return book; }
+  const Space<dim> &space() const { return unknowns; }
+
+  struct Work
+  {
+    unsigned long newton_iterations = 0, linear_solves = 0, linear_iterations = 0, rejected_steps = 0;
+  };
+  const Work &work() const { return done; }
+
+private:
+  void resize();
+  void find_unused(std::vector<typename Space<dim>::Index> &unused) const;
+  void project_start();
+  VolumeLoads<dim> volume_loads(double time) const;
+
+  void dynamic_step(double dt);
+  void damped_step(double dt);
+  void generalised_alpha_step(double dt);
+  double quasi_static_step(double latest);
+  /// Both stages of a step; returns the estimated error.
+  double diagonally_implicit_step(double dt);
+
+  /// Find the unknowns at the end of [start, end] that satisfy the equations at a level.
+  void solve(const TimeLevel &level, double start, double end);
+  void assemble(const TimeLevel &level, bool with_matrix);
+  bool needs_matrix(const TimeLevel &level) const;
+  double residual_norm(unsigned int block) const;
+  bool converged() const;
+  void line_search(const TimeLevel &level, double before);
+  void share_unknown();
+  /// After the unknowns have been found: points, tracers, balances.
+  void accept(const TimeLevel &level);
+  void move_tracers();
+  void relocate_points();
+  TimeLevel level(double time, double dt) const;
+
+  const ImplicitParameters &parameters;
+  const Method method;
+  const bool seepage_inertia;
+  const Grid<dim> &grid;
+  Scene<dim> &scene;
+  const bool linear;
+
+  Space<dim> unknowns;
+  ActiveNodes<dim> active;
+  std::unique_ptr<UpForm<dim>> form;
+  UpBoundary<dim> boundary;
+  LinearSolver linear_solver;
+  BlockMatrix matrix;
+  bool matrix_is_valid = false;
+  TimeLevel matrix_level;
+
+  BlockVector unknown, correction, residual, right_side; ///< this rank's
+  BlockVector rate;         ///< v [m/s] and p_t [Pa/s] at the start of the step
+  BlockVector second;       ///< a [m/s^2] and p [Pa]
+  BlockVector total;        ///< displacement since the last reset [m]
+  BlockVector ghosted_total, ghosted_rate;
+  StepState state;
+
+  double now;
+  Mode mode = Mode::dynamic;
+  unsigned int damped_steps_left = 0;
+  double next_step = 0.; ///< quasi-static [s]
+  bool first_step_done = false;
+  double pressure_scale = 0., displacement_scale = 0.;
+  std::array<double, 2> residual_scale{};
+  NodalFields<dim> nodal;
+  Ledger<dim> book;
+  Work done;
+};
+} // namespace peat

@@ -1,0 +1,437 @@
+#include <peat/solver/up_solver.h>
+
+#include <peat/material/mixture.h>
+
+#include <deal.II/base/mpi.h>
+#include <deal.II/lac/block_sparsity_pattern.h>
+#include <deal.II/lac/sparsity_tools.h>
+
+#include <sstream>
+
+namespace peat {
+namespace {
+template <int dim>
+bool is_linear(const Scene<dim> &scene)
+{
+  return std::all_of(scene.bodies.begin(), scene.bodies.end(), [](const auto &body) {
+    return body->material().law().is_linear() && body->layout().porosity < 0;
+  });
+}
+
+bool same(const TimeLevel &a, const TimeLevel &b)
+{
+  const auto equal = [](const double x, const double y) { return std::abs(x - y) <= 1e-10 * std::abs(x); };
+  return equal(a.share, b.share) && equal(a.velocity, b.velocity) && equal(a.acceleration, b.acceleration) &&
+         equal(a.pressure_rate, b.pressure_rate) && equal(a.dt, b.dt) &&
+         a.seepage_inertia == b.seepage_inertia;
+}
+} // namespace
+
+template <int dim>
+UpSolver<dim>::UpSolver(const ImplicitParameters &parameters, const LinearSolverParameters &linear_parameters,
+                        const Method method, const Nodes displacement, const bool seepage_inertia,
+                        const Grid<dim> &grid, Scene<dim> &scene, const double start_time,
+                        const Ledger<dim> &carried)
+    : parameters(parameters), method(method), seepage_inertia(seepage_inertia), grid(grid), scene(scene),
+      linear(is_linear(scene)), unknowns(grid, displacement),
+      active(grid, displacement == Nodes::gimp ? 4 : 2), form(UpForm<dim>::make(unknowns)),
+      boundary(unknowns, scene, parameters.surface_penalty), linear_solver(linear_parameters), now(start_time),
+      book(carried)
+{}
+
+template <int dim>
+UpSolver<dim>::~UpSolver() = default;
+
+template <int dim>
+void UpSolver<dim>::prepare()
+{
+  std::vector<CellId> solid, saturated;
+  const auto sort = [](std::vector<CellId> &cells) {
+    std::sort(cells.begin(), cells.end());
+    cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+  };
+  for (const auto &body : scene.bodies)
+    for (const Slice &slice : body->slices()) {
+      solid.push_back(slice.cell);
+      if (body->material().mixture())
+        saturated.push_back(slice.cell);
+    }
+  sort(solid);
+  sort(saturated);
+  unknowns.distribute(solid, saturated);
+  active.rebuild(solid);
+  for (auto &[name, tracers] : scene.surfaces) {
+    if (method == Method::material_points)
+      tracers.settle(scene.body(name), active);
+    tracers.locate(active);
+  }
+  std::vector<typename Space<dim>::Index> unused;
+  find_unused(unused);
+  boundary.locate(active, unused);
+  resize();
+  project_start();
+}
+
+template <int dim>
+void UpSolver<dim>::find_unused(std::vector<typename Space<dim>::Index> &unused) const
+{
+  // Domains of material points that end on a face of cells reach nodes beyond it in name only.
+  if (unknowns.nodes() != Nodes::gimp)
+    return;
+  dealii::TrilinosWrappers::MPI::Vector mass(unknowns.owned()[0], grid.communicator());
+  for (const auto &body : scene.bodies)
+    form->sum_mass(*body, mass);
+  mass.compress(dealii::VectorOperation::add);
+  const double largest = mass.linfty_norm();
+  dealii::TrilinosWrappers::MPI::Vector all(unknowns.owned()[0], unknowns.relevant()[0], grid.communicator());
+  all = mass;
+  for (const auto index : unknowns.relevant()[0])
+    if (all(index) <= 1e-14 * largest)
+      unused.push_back(index);
+}
+
+template <int dim>
+void UpSolver<dim>::resize()
+{
+  const MPI_Comm communicator = grid.communicator();
+  dealii::BlockDynamicSparsityPattern pattern(unknowns.relevant());
+  std::vector<typename Space<dim>::Index> list;
+  for (const auto &body : scene.bodies)
+    for (const Slice &slice : body->slices()) {
+      const auto *u = unknowns.displacements(slice.cell);
+      list.assign(u, u + unknowns.n_cell_nodes() * dim);
+      if (body->material().mixture() && unknowns.has_pressure()) {
+        const auto *p = unknowns.pressures(slice.cell);
+        list.insert(list.end(), p, p + Space<dim>::n_pressures);
+      }
+      boundary.constraints().add_entries_local_to_global(list, pattern, false);
+    }
+  dealii::IndexSet owned(unknowns.n_unknowns()), relevant(unknowns.n_unknowns());
+  for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
+    owned.add_indices(unknowns.owned()[b], b * unknowns.first_pressure());
+    relevant.add_indices(unknowns.relevant()[b], b * unknowns.first_pressure());
+  }
+  // Unknowns on a rank's edge whose cells lie on other ranks have no entry yet, and need a diagonal.
+  for (const auto index : owned)
+    pattern.add(index, index);
+  dealii::SparsityTools::distribute_sparsity_pattern(pattern, owned, communicator, relevant);
+  matrix.clear();
+  matrix.reinit(unknowns.owned(), pattern, communicator);
+  matrix_is_valid = false;
+
+  for (BlockVector *vector : {&unknown, &correction, &residual, &right_side, &rate, &second, &total})
+    vector->reinit(unknowns.owned(), communicator);
+  for (BlockVector *vector :
+       {&state.unknown, &state.rate_history, &state.second_history, &ghosted_total, &ghosted_rate})
+    vector->reinit(unknowns.owned(), unknowns.relevant(), communicator);
+}
+
+template <int dim>
+VolumeLoads<dim> UpSolver<dim>::volume_loads(const double time) const
+{
+  VolumeLoads<dim> loads;
+  const double origin[3] = {0., 0., 0.};
+  for (unsigned int d = 0; d < dim; ++d)
+    loads.gravity[d] = scene.gravity.value(origin, time, d);
+  for (const auto &condition : scene.conditions) {
+    if (condition->has_body_force())
+      loads.forces.push_back(condition.get());
+    if (condition->has_fluid_source())
+      loads.fluids.push_back(condition.get());
+  }
+  return loads;
+}
+
+template <int dim>
+TimeLevel UpSolver<dim>::level(const double time, const double dt) const
+{
+  TimeLevel level;
+  level.time = time;
+  level.dt = dt;
+  level.seepage_inertia = seepage_inertia;
+  return level;
+}
+
+template <int dim>
+void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
+{
+  residual = 0.;
+  if (with_matrix)
+    matrix = 0.;
+  share_unknown();
+  const VolumeLoads<dim> loads = volume_loads(level.time);
+  const double stabilisation = unknowns.nodes() == Nodes::q2 ? 0. : parameters.stabilisation;
+  for (const auto &body : scene.bodies)
+    form->assemble(*body, level, state, loads, stabilisation, boundary.constraints(), residual,
+                   with_matrix ? &matrix : nullptr);
+  boundary.assemble(level, state, residual, with_matrix ? &matrix : nullptr);
+  residual.compress(dealii::VectorOperation::add);
+  right_side = residual;
+  boundary.constraints().set_zero(right_side);
+  if (!with_matrix)
+    return;
+  // What is prescribed stands for itself.
+  for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
+    for (const auto index : unknowns.owned()[b])
+      if (boundary.constraints().is_constrained(index + b * unknowns.first_pressure()) &&
+          matrix.block(b, b).diag_element(index) == 0.)
+        matrix.block(b, b).set(index, index, b == 0 ? 1. : level.fluid_scale());
+  matrix.compress(dealii::VectorOperation::unknown);
+  matrix_level = level;
+  matrix_is_valid = true;
+  linear_solver.prepare(matrix);
+}
+
+template <int dim>
+void UpSolver<dim>::share_unknown()
+{
+  state.unknown = unknown;
+}
+
+template <int dim>
+bool UpSolver<dim>::needs_matrix(const TimeLevel &level) const
+{
+  return !matrix_is_valid || !linear || !same(level, matrix_level);
+}
+
+template <int dim>
+double UpSolver<dim>::residual_norm(const unsigned int block) const
+{
+  const double scale = residual_scale[block];
+  return scale > 0. ? right_side.block(block).l2_norm() / scale : 0.;
+}
+
+template <int dim>
+bool UpSolver<dim>::converged() const
+{
+  for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
+    if (!(residual_norm(b) <= parameters.newton_tolerance))
+      return false;
+  return true;
+}
+
+template <int dim>
+void UpSolver<dim>::solve(const TimeLevel &level, const double start, const double end)
+{
+  boundary.prescribe(start, end, unknown);
+  for (unsigned int iteration = 0;; ++iteration) {
+    // Of a linear problem the matrix is needed once, at the first residual.
+    const bool with_matrix = iteration == 0 ? needs_matrix(level) : !linear;
+    assemble(level, with_matrix);
+    for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
+      const double scale = std::abs(b == 1 ? level.fluid_scale() : 1.);
+      // Forces and volumes that hold the prescribed unknowns belong to the scale, too.
+      const double size = (iteration == 0 ? right_side : residual).block(b).l2_norm();
+      if (b == 1 && iteration == 0)
+        residual_scale[1] *= scale / fluid_scale_before;
+      residual_scale[b] = std::max(residual_scale[b], size);
+    }
+    fluid_scale_before = std::abs(level.fluid_scale());
+    if (!std::isfinite(right_side.l2_norm()) || iteration > parameters.newton_iterations) {
+      std::ostringstream text;
+      text << "the equations of the step from t = " << start << " s to " << end << " s have "
+           << (std::isfinite(right_side.l2_norm()) ? "not been solved" : "no finite solution") << " after "
+           << iteration << " iterations (residual of momentum " << residual_norm(0);
+      if (unknowns.has_pressure())
+        text << ", of fluid mass " << residual_norm(1);
+      text << "); use shorter steps, or more 'Newton iterations'";
+      throw NumericalError(text.str());
+    }
+    if (iteration > 0 && converged())
+      return;
+    if (iteration == 0 && right_side.l2_norm() == 0.)
+      return;
+    correction = 0.;
+    done.linear_iterations += linear_solver.solve(correction, right_side);
+    boundary.constraints().set_zero(correction);
+    ++done.linear_solves;
+    ++done.newton_iterations;
+    unknown += correction;
+    if (!linear)
+      line_search(level, right_side.l2_norm());
+  }
+}
+
+template <int dim>
+void UpSolver<dim>::line_search(const TimeLevel &level, const double before)
+{
+  // Full steps unless they make things worse.
+  constexpr unsigned int most_halvings = 5;
+  double length = 1.;
+  for (unsigned int k = 0; k < most_halvings; ++k) {
+    assemble(level, false);
+    const double after = right_side.l2_norm();
+    if (std::isfinite(after) && after <= before)
+      return;
+    length *= 0.5;
+    unknown.add(-length, correction);
+  }
+}
+
+template <int dim>
+void UpSolver<dim>::project_start()
+{
+  // Nodal pressures from the points': with no rates and no loads the storage term says (S p_n)_i = sum V p N /
+  // Q.
+  second = 0.;
+  if (!unknowns.has_pressure())
+    return;
+  TimeLevel level = this->level(now, 0.);
+  level.share = 0.;
+  level.pressure_rate = 1.;
+  level.acceleration = 1.;
+  level.seepage_inertia = false;
+  unknown = 0.;
+  state.rate_history = 0.;
+  state.second_history = 0.;
+  residual = 0.;
+  matrix = 0.;
+  share_unknown();
+  dealii::AffineConstraints<double> none;
+  none.close();
+  for (const auto &body : scene.bodies)
+    form->assemble(*body, level, state, {}, 0., none, residual, &matrix);
+  residual.compress(dealii::VectorOperation::add);
+  matrix.compress(dealii::VectorOperation::unknown);
+  residual.block(0) = 0.;
+  linear_solver.prepare(matrix);
+  matrix_is_valid = false;
+  correction = 0.;
+  linear_solver.solve(correction, residual);
+  second.block(1) = correction.block(1);
+}
+
+template <int dim>
+void UpSolver<dim>::accept(const TimeLevel &level)
+{
+  share_unknown();
+  ghosted_rate = rate;
+  StepWork work;
+  for (const auto &body : scene.bodies)
+    form->update_points(*body, level, state, ghosted_rate, volume_loads(level.time).gravity,
+                        method == Method::material_points, work);
+  const double dt = level.dt;
+  const auto held = boundary.reactions(level, residual, unknown);
+  const auto &loads = boundary.loads();
+  // Gravity acts on mass, which does not change: its share of the sums is that of the momentum equation.
+  dealii::Tensor<1, dim> weight;
+  double gravity_work = 0.;
+  form_weight(level, weight, gravity_work);
+  book.impulse += dt * (held.force + loads.force + weight);
+  book.gross_impulse += dt * (held.gross_force + loads.gross_force + weight.norm());
+  book.external_work += held.work + loads.work + gravity_work;
+  book.gravity_work += gravity_work;
+  book.fluid_outflow += dt * (held.outflow + loads.outflow);
+  book.fluid_squeezed += work.fluid_squeezed;
+  book.seepage_dissipation += work.seepage_dissipation;
+  book.seepage_work += work.seepage_work;
+  total += unknown;
+  if (unknowns.has_pressure())
+    second.block(1) = unknown.block(1);
+  int finite = work.finite;
+  finite = dealii::Utilities::MPI::min(finite, grid.communicator());
+  now += dt;
+  if (!finite) {
+    std::ostringstream text;
+    text << "a stress, pressure or velocity is not finite, t = " << now << " s, step " << dt << " s";
+    throw NumericalError(text.str());
+  }
+  move_tracers();
+  if (method == Method::material_points)
+    relocate_points();
+}
+
+template <int dim>
+void UpSolver<dim>::form_weight(const TimeLevel &level, dealii::Tensor<1, dim> &weight, double &work) const
+{
+  const VolumeLoads<dim> loads = volume_loads(level.time);
+  if (loads.gravity.norm() == 0. && loads.forces.empty())
+    return;
+  // The points have taken the step: their displacement of it is that of the unknowns.
+  for (const auto &body : scene.bodies)
+    form->sum_weight(*body, state, loads, level.time, weight, work);
+}
+
+template <int dim>
+void UpSolver<dim>::move_tracers()
+{
+  nodal.dt = 1.;
+  if (method == Method::finite_elements) {
+    if (!scene.probes)
+      return;
+    ghosted_total = total;
+    scene.probes->place([&](const dealii::Point<dim> &x, const CellId cell) {
+      return unknowns.value(ghosted_total.block(0), cell, x);
+    });
+    return;
+  }
+  // Tracers know vertices only; what lies between is what the points see, too.
+  std::vector<double> step(std::size_t(active.size()) * dim, 0.);
+  for (unsigned int i = 0; i < active.size(); ++i)
+    if (const auto *node = unknowns.node_at(active.grid_node(i)))
+      for (unsigned int d = 0; d < dim; ++d)
+        step[std::size_t(i) * dim + d] = state.unknown.block(0)(node->displacement[d]);
+  for (auto &[name, tracers] : scene.surfaces)
+    tracers.move(step, 1., scene.body(name).material().law().finite_strain(), active);
+  if (scene.probes) {
+    scene.probes->locate(active);
+    scene.probes->move(step, 1., false, active);
+  }
+}
+
+template <int dim>
+void UpSolver<dim>::relocate_points()
+{
+  int changed = 0, leaves = 0;
+  std::string message;
+  for (const auto &body : scene.bodies) {
+    try {
+      body->note_movers();
+      const auto relocation = body->relocate(now);
+      changed |= relocation.cells_changed;
+      leaves |= relocation.leaves_rank;
+    } catch (const NumericalError &error) {
+      message = error.what();
+    }
+  }
+  for (const std::string &one : dealii::Utilities::MPI::all_gather(grid.communicator(), message))
+    if (!one.empty())
+      throw NumericalError(one);
+  if (dealii::Utilities::MPI::n_mpi_processes(grid.communicator()) > 1) {
+    for (const auto &[name, tracers] : scene.surfaces)
+      leaves |= tracers.leaves_rank();
+    leaves |= scene.probes && scene.probes->leaves_rank();
+    leaves = dealii::Utilities::MPI::max(leaves, grid.communicator());
+    if (leaves) {
+      for (const auto &body : scene.bodies)
+        body->synchronise(now);
+      for (auto &[name, tracers] : scene.surfaces)
+        tracers.migrate();
+      if (scene.probes)
+        scene.probes->migrate();
+    }
+  }
+  changed = dealii::Utilities::MPI::max(changed | leaves, grid.communicator());
+  if (changed)
+    prepare();
+  else
+    matrix_is_valid = false;
+}
+
+template <int dim>
+void UpSolver<dim>::reset_displacements()
+{
+  for (const auto &body : scene.bodies)
+    for (const std::uint32_t handle : body->handles())
+      for (unsigned int d = 0; d < dim; ++d)
+        body->row(handle)[body->layout().displacement + d] = 0.;
+  for (auto &[name, tracers] : scene.surfaces)
+    tracers.restart();
+  if (scene.probes)
+    scene.probes->restart();
+  total = 0.;
+}
+
+template class UpSolver<2>;
+template class UpSolver<3>;
+} // namespace peat
