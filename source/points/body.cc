@@ -2,6 +2,7 @@
 #include <peat/points/body.h>
 
 #include <deal.II/base/mpi.h>
+#include <deal.II/base/quadrature_lib.h>
 
 #include <numeric>
 #include <sstream>
@@ -43,7 +44,7 @@ Body<dim>::Body(const BodyParameters<dim> &parameters, const Material &material,
       initial_shape(parameters.shape), particles(grid.triangulation(), grid.mapping(), columns.n_columns),
       count_in_cell(grid.n_local_cells(), 0)
 {
-  seed(parameters);
+  seed(parameters, scheme.gauss_points);
   attach_storage();
   initial_number = particles.n_global_particles();
   if (initial_number == 0)
@@ -95,10 +96,63 @@ void fill_row(std::vector<double> &row, const Layout &layout, const Material &ma
 }
 } // namespace
 
+namespace {
 template <int dim>
-void Body<dim>::seed(const BodyParameters<dim> &parameters)
+struct PartOfCell
 {
-  const unsigned int n = parameters.points_per_direction;
+  CutBox<dim> part;
+  dealii::Tensor<1, dim> edges; ///< of the box it was cut from
+};
+
+/// What the shape fills of n^dim equal boxes of a cell.
+template <int dim>
+std::vector<PartOfCell<dim>> even_parts(const Shape<dim> &shape, const Grid<dim> &grid, const CellId id,
+                                        const unsigned int n)
+{
+  std::vector<PartOfCell<dim>> parts;
+  for (unsigned int b = 0; b < (dim == 2 ? n * n : n * n * n); ++b) {
+    dealii::Point<dim> lower, upper;
+    dealii::Tensor<1, dim> edges;
+    for (unsigned int d = 0, rest = b; d < dim; ++d, rest /= n) {
+      const double h = grid.size(id, d);
+      lower[d] = grid.lower(id, d) + h * (rest % n) / n;
+      upper[d] = grid.lower(id, d) + h * (rest % n + 1) / n;
+      edges[d] = h / n;
+    }
+    const CutBox<dim> part = cut(shape, lower, upper);
+    if (part.volume > 0.)
+      parts.push_back({part, edges});
+  }
+  return parts;
+}
+
+/// Gauss points of a cell that the shape fills; elsewhere what it fills of as many boxes and some more.
+template <int dim>
+std::vector<PartOfCell<dim>> gauss_parts(const Shape<dim> &shape, const Grid<dim> &grid, const CellId id,
+                                         const unsigned int n)
+{
+  const auto whole = even_parts(shape, grid, id, 1);
+  if (whole.empty())
+    return {};
+  if (whole.front().part.volume < grid.volume(id) * (1. - 1e-10))
+    return even_parts(shape, grid, id, 2 * n);
+  std::vector<PartOfCell<dim>> parts;
+  const dealii::QGauss<dim> rule(n);
+  for (unsigned int q = 0; q < rule.size(); ++q) {
+    PartOfCell<dim> point;
+    point.part.volume = rule.weight(q) * grid.volume(id);
+    for (unsigned int d = 0; d < dim; ++d)
+      point.part.centroid[d] = grid.lower(id, d) + rule.point(q)[d] * grid.size(id, d);
+    parts.push_back(point);
+  }
+  return parts;
+}
+} // namespace
+
+template <int dim>
+void Body<dim>::seed(const BodyParameters<dim> &parameters, const unsigned int gauss_points)
+{
+  const unsigned int n = gauss_points > 0 ? gauss_points : parameters.points_per_direction;
   const unsigned int n_boxes = dim == 2 ? n * n : n * n * n;
   const auto bounds = initial_shape->bounds();
 
@@ -119,18 +173,8 @@ void Body<dim>::seed(const BodyParameters<dim> &parameters)
   std::string problem;
   const auto make_points = [&](const auto &cell) {
     const CellId id = cell->active_cell_index();
-    for (unsigned int b = 0; b < n_boxes; ++b) {
-      dealii::Point<dim> lower, upper;
-      dealii::Tensor<1, dim> edges;
-      for (unsigned int d = 0, rest = b; d < dim; ++d, rest /= n) {
-        const double h = grid.size(id, d);
-        lower[d] = grid.lower(id, d) + h * (rest % n) / n;
-        upper[d] = grid.lower(id, d) + h * (rest % n + 1) / n;
-        edges[d] = h / n;
-      }
-      const CutBox<dim> part = cut(*initial_shape, lower, upper);
-      if (part.volume == 0.)
-        continue;
+    for (const auto &[part, edges] : gauss_points > 0 ? gauss_parts(*initial_shape, grid, id, n)
+                                                      : even_parts(*initial_shape, grid, id, n)) {
       fill_row(row, columns, body_material, parameters, part, half_extents(part, edges));
       const auto unit = grid.mapping().transform_real_to_unit_cell(cell, part.centroid);
       particles.insert_particle(part.centroid, unit, n_local++, cell, row);
@@ -215,6 +259,19 @@ void Body<dim>::rebuild_slices()
     handles_by_cell[count_in_cell[cell_of_point[handle]]++] = handle;
   for (const CellId cell : occupied)
     count_in_cell[cell] = 0;
+}
+
+template <int dim>
+void Body<dim>::note_movers()
+{
+  for (std::uint32_t handle = 0; handle < cell_of_point.size(); ++handle)
+    for (unsigned int d = 0; d < dim; ++d) {
+      const double x = position(handle)[d] - grid.lower(cell_of_point[handle], d);
+      if (x < 0. || x > grid.size(cell_of_point[handle], d)) {
+        moved_points.push_back(handle);
+        break;
+      }
+    }
 }
 
 template <int dim>

@@ -2,6 +2,7 @@
 #include <peat/points/tracers.h>
 
 #include <deal.II/base/mpi.h>
+#include <deal.II/base/quadrature_lib.h>
 
 namespace peat {
 namespace {
@@ -103,6 +104,52 @@ public:
     return pieces;
   }
 
+  /// If the shape fills the box and none of its neighbours in part only: Gauss points on its faces beyond which
+  /// there is nothing of the shape.
+  bool add_whole_faces(const Bounds<dim> &box, const unsigned int n,
+                       std::vector<typename Tracers<dim>::Tracer> &list) const
+  {
+    const auto fill = [&](const Bounds<dim> &bounds) {
+      double volume = 1.;
+      for (unsigned int d = 0; d < dim; ++d)
+        volume *= bounds.upper[d] - bounds.lower[d];
+      return cut(shape, bounds.lower, bounds.upper).volume / volume;
+    };
+    if (fill(box) < 1. - 1e-10)
+      return false;
+    std::vector<unsigned int> faces;
+    for (unsigned int face = 0; face < 2 * dim; ++face) {
+      const Bounds<dim> beyond = neighbour_box(box, face);
+      if (!grid.contains(beyond.center()))
+        continue;
+      const double filled = fill(beyond);
+      if (filled > 0. && filled < 1. - 1e-10)
+        return false;
+      if (filled == 0.)
+        faces.push_back(face);
+    }
+    const dealii::QGauss<dim - 1> rule(n);
+    for (const unsigned int face : faces)
+      for (unsigned int q = 0; q < rule.size(); ++q) {
+        const unsigned int axis = face / 2;
+        typename Tracers<dim>::Tracer tracer{std::uint32_t(list.size()), {}, {}, {}};
+        double area = rule.weight(q);
+        for (unsigned int d = 0, tangent = 0; d < dim; ++d) {
+          const double h = box.upper[d] - box.lower[d];
+          if (d == axis) {
+            tracer.position[d] = face % 2 ? box.upper[d] : box.lower[d];
+            continue;
+          }
+          tracer.position[d] = box.lower[d] + rule.point(q)[tangent++] * h;
+          area *= h;
+        }
+        tracer.initial_position = tracer.position;
+        tracer.area[axis] = face % 2 ? area : -area;
+        list.push_back(tracer);
+      }
+    return true;
+  }
+
 private:
   /// If what is left of the box is a box itself: its faces inside the box, exactly.
   static bool add_faces_along_axes(const Bounds<dim> &box, const CutBox<dim> &part,
@@ -151,7 +198,8 @@ private:
 } // namespace
 
 template <int dim>
-void Tracers<dim>::cover(const Shape<dim> &shape, const unsigned int pieces_per_direction)
+void Tracers<dim>::cover(const Shape<dim> &shape, const unsigned int pieces_per_direction,
+                         const unsigned int gauss_points)
 {
   const unsigned int n = pieces_per_direction;
   const unsigned int n_boxes = dim == 2 ? n * n : n * n * n;
@@ -165,6 +213,8 @@ void Tracers<dim>::cover(const Shape<dim> &shape, const unsigned int pieces_per_
       cell_box.upper[d] = grid.lower(cell, d) + grid.size(cell, d);
     }
     if (shape.is_distance() && std::abs(shape.distance(cell_box.center())) > 1.1 * cell_box.radius())
+      continue;
+    if (gauss_points > 0 && collector.add_whole_faces(cell_box, gauss_points, list))
       continue;
     for (unsigned int b = 0; b < n_boxes; ++b)
       for (const Piece<dim> &piece : collector.collect(part_of_box(cell_box, n, b)))
@@ -333,6 +383,21 @@ void Tracers<dim>::move(const std::vector<double> &velocity, const double dt, co
     if (stretch)
       list[t].area += dt * (dealii::trace(gradient) * point.area - dealii::transpose(gradient) * point.area);
   }
+}
+
+template <int dim>
+void Tracers<dim>::place(
+    const std::function<dealii::Tensor<1, dim>(const dealii::Point<dim> &)> &displacement)
+{
+  for (Tracer &tracer : list)
+    tracer.position = tracer.initial_position + displacement(tracer.initial_position);
+}
+
+template <int dim>
+void Tracers<dim>::restart()
+{
+  for (Tracer &tracer : list)
+    tracer.initial_position = tracer.position;
 }
 
 template <int dim>

@@ -8,14 +8,27 @@
 namespace peat {
 StageParameters::StageParameters(Section section) : name(section.name())
 {
-  std::string solver = "mpm";
-  section.add("Solver", solver, {"mpm"}, "'mpm': the explicit coupled material point method.");
-  section.add("Duration", duration, positive("s"), "How long the stage lasts.");
+  std::string solver_name = "dynamic";
+  section.add("Solver", solver_name, {"dynamic", "quasi-static", "static"},
+              "'dynamic': the full equations. 'quasi-static': without inertia, in steps as long as the pressures "
+              "change slowly. 'static': the state of equilibrium and of steady seepage under the loads at that "
+              "time.");
+  solver = solver_name == "static"         ? Solver::static_state
+           : solver_name == "quasi-static" ? Solver::quasi_static
+                                           : Solver::dynamic;
+  section.add("Duration", duration, nonnegative("s"), "How long the stage lasts; a static one takes no time.");
+  section.add("Reset displacements", reset_displacements,
+              "Count displacements from the end of this stage; stresses, pressures and history stay.");
   section.add(
       "Local damping", local_damping, between(0., 0.99),
       "Share of each node's out-of-balance force that acts against its velocity in this stage; for dynamic "
       "relaxation to rest.");
-  section.require("Duration", "stage '" + name + "'");
+  if (section.describing())
+    return;
+  if (solver != Solver::static_state)
+    section.require("Duration", "stage '" + name + "'");
+  if (solver == Solver::static_state ? duration > 0. : duration == 0.)
+    section.fail("Duration", solver == Solver::static_state ? "a static stage takes no time" : "must be > 0 s");
 }
 
 unsigned int read_dimension(const ParameterFile &file)
@@ -94,6 +107,15 @@ Function read_gravity(Section root)
   return gravity;
 }
 
+Method read_method(Section root)
+{
+  std::string name = "mpm";
+  root.add("Method", name, {"mpm", "fem"},
+           "'mpm': the coupled material point method. 'fem': u-p finite elements on the cells that the bodies "
+           "fill.");
+  return name == "fem" ? Method::fem : Method::mpm;
+}
+
 SchemeParameters read_scheme(Section root)
 {
   SchemeParameters scheme(root.subsection("Explicit MPM"));
@@ -145,7 +167,9 @@ Case<dim>::Case(const ParameterFile &file)
       materials(read_materials(file.root().subsection("Materials"))),
       bodies(read_bodies<dim>(file.root().subsection("Bodies"), materials)),
       conditions(read_conditions<dim>(file.root().subsection("Conditions"), names(bodies))),
-      gravity(read_gravity<dim>(file.root())), scheme(read_scheme(file.root())),
+      gravity(read_gravity<dim>(file.root())), method(read_method(file.root())),
+      scheme(read_scheme(file.root())), implicit(file.root().subsection("Implicit solver")),
+      linear(file.root().subsection("Linear solver")),
       stages(read_list<StageParameters>(file.root().subsection("Stages"), "STAGE")),
       probes(read_list<ProbeParameters<dim>>(file.root().subsection("Probes"), "PROBE")),
       references(read_list<ReferenceParameters<dim>>(file.root().subsection("References"), "REFERENCE",
@@ -204,6 +228,25 @@ void Case<dim>::check(const Section &root) const
                                       std::make_pair("Probe interval", output.probe_interval)})
     if (interval > 0. && end_time() / interval > most_lines)
       section.fail(key, "in " + to_text(end_time()) + " s this makes more than 1e7 entries");
+}
+
+template <int dim>
+bool Case<dim>::is_implicit() const
+{
+  return method == Method::fem || std::any_of(stages.begin(), stages.end(), [](const auto &stage) {
+           return stage.solver != StageParameters::Solver::dynamic;
+         });
+}
+
+template <int dim>
+SchemeFields Case<dim>::fields() const
+{
+  SchemeFields fields = scheme.fields();
+  if (method == Method::fem) {
+    fields.extent = false;
+    fields.gauss_points = static_cast<unsigned int>(implicit.element);
+  }
+  return fields;
 }
 
 template <int dim>

@@ -127,7 +127,7 @@ Comparison<dim>::Comparison(const Case<dim> &parameters, const std::string &dire
     reference.parameters = &given;
     for (const auto &body : parameters.bodies) {
       const Material &material = parameters.material(body.material);
-      const FieldAccess access(given.field, Layout(dim, material, parameters.scheme.fields()), material);
+      const FieldAccess access(given.field, Layout(dim, material, parameters.fields()), material);
       reference.unit = access.available() ? access.unit() : reference.unit;
     }
     if (given.kind != ReferenceParameters<dim>::Kind::formula)

@@ -32,17 +32,24 @@ Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid)
   for (const auto &body : parameters.bodies) {
     check_inside_mesh(body, parameters.grid);
     scene.bodies.push_back(std::make_unique<Body<dim>>(body, parameters.material(body.material), grid,
-                                                       parameters.scheme.fields()));
+                                                       parameters.fields()));
   }
-  for (auto &condition : parameters.conditions) {
-    const std::string &name = condition->surface_of();
-    if (!name.empty() && scene.surfaces.find(name) == scene.surfaces.end()) {
-      auto &surface = scene.surfaces.emplace(name, grid).first->second;
-      for (const auto &body : parameters.bodies)
-        if (body.name == name)
-          surface.cover(*body.shape, body.points_per_direction);
-    }
-  }
+  const auto add_surface = [&](const std::string &name) {
+    if (scene.surfaces.find(name) != scene.surfaces.end())
+      return;
+    auto &surface = scene.surfaces.emplace(name, grid).first->second;
+    for (const auto &body : parameters.bodies)
+      if (body.name == name)
+        surface.cover(*body.shape, body.points_per_direction, parameters.fields().gauss_points);
+  };
+  for (auto &condition : parameters.conditions)
+    if (!condition->surface_of().empty())
+      add_surface(condition->surface_of());
+  // An implicit solver prescribes the pressure on free surfaces, which an explicit step has by nature.
+  if (parameters.is_implicit())
+    for (const auto &body : scene.bodies)
+      if (body->material().mixture())
+        add_surface(body->name());
   if (!parameters.probes.empty()) {
     scene.probes = std::make_unique<Tracers<dim>>(grid);
     for (unsigned int i = 0; i < parameters.probes.size(); ++i) {

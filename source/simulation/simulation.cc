@@ -1,21 +1,16 @@
 #include <peat/simulation/simulation.h>
 
 #include <deal.II/base/mpi.h>
-#include <deal.II/base/timer.h>
 
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
-#include <sstream>
+
+#include "outputs.h"
 
 namespace peat {
 namespace {
 volatile std::sig_atomic_t signal_received = 0;
-
-double seconds()
-{
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 std::string prepare_directory(const RunOptions &options, MPI_Comm communicator)
 {
@@ -54,49 +49,6 @@ void StepRecord::add(const double dt)
   largest = std::max(largest, dt);
   total_time += dt;
 }
-
-/// All that is written while the run goes on, and when.
-template <int dim>
-struct Simulation<dim>::Outputs
-{
-  Outputs(const Case<dim> &parameters, const std::string &directory, const Scene<dim> &scene,
-          const Grid<dim> &grid)
-      : statistics(directory, dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0)
-  {
-    if (scene.probes)
-      probes = std::make_unique<ProbeWriter<dim>>(parameters, scene, grid, directory + "/probes.csv");
-    if (parameters.output.pictures)
-      pictures = std::make_unique<Pictures<dim>>(directory, scene, grid.communicator());
-  }
-
-  void plan(const OutputParameters &output, const Comparison<dim> &comparison, const double start,
-            const double end)
-  {
-    const double statistics_interval =
-        output.statistics_interval > 0. ? output.statistics_interval : (end - start) / 200.;
-    statistics_times = Schedule::every(statistics_interval, start, end);
-    probe_times =
-        Schedule::every(output.probe_interval > 0. ? output.probe_interval : statistics_interval, start, end);
-    picture_times = Schedule::every(output.interval, start, end);
-    comparison_times = Schedule::at(comparison.times(), start, end);
-  }
-
-  /// When something is next due.
-  double next() const
-  {
-    double time = std::min(statistics_times.next(), comparison_times.next());
-    if (probes)
-      time = std::min(time, probe_times.next());
-    if (pictures)
-      time = std::min(time, picture_times.next());
-    return time;
-  }
-
-  Statistics<dim> statistics;
-  std::unique_ptr<ProbeWriter<dim>> probes;
-  std::unique_ptr<Pictures<dim>> pictures;
-  Schedule statistics_times, probe_times, picture_times, comparison_times;
-};
 
 template <int dim>
 Simulation<dim>::Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options,
@@ -153,70 +105,9 @@ bool Simulation<dim>::interrupted()
 }
 
 template <int dim>
-void Simulation<dim>::run_stage(const StageParameters &stage, const double start)
-{
-  const double end = start + stage.duration;
-  stage_scheme.local_damping = std::max(parameters.scheme.local_damping, stage.local_damping);
-  const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
-  solver = std::make_unique<ExplicitMPM<dim>>(stage_scheme, grid, scene, start, carried);
-  solver->prepare();
-  outputs->plan(parameters.output, comparison, start, end);
-  std::ostringstream message;
-  message << "stage '" << stage.name << "': " << stage.duration << " s, stable step "
-          << solver->stable_step().dt << " s (" << solver->stable_step().limit << ')';
-  log.line(message.str());
-  if (steps.n_steps == 0)
-    report(now, true);
-
-  // Between two events the step is constant, unless the stable step has changed by then.
-  constexpr unsigned int steps_between_checks = 100;
-  unsigned int steps_since_check = 0;
-  StableStep stable = solver->stable_step();
-  double clock = seconds();
-  while (now < end && !stopped) {
-    if (steps_since_check >= steps_between_checks) {
-      stable = solver->stable_step();
-      steps_since_check = 0;
-    }
-    const double wanted =
-        stage_scheme.fixed_step > 0. ? stage_scheme.fixed_step : stage_scheme.step_factor * stable.dt;
-    if (stage_scheme.fixed_step > stable.dt) {
-      std::ostringstream message;
-      message << "'Time step' " << wanted << " s is above the stable step " << stable.dt << " s ("
-              << stable.limit << ") at t = " << now << " s";
-      throw NumericalError(message.str());
-    }
-    steps.limit = stable.limit;
-    const double event = std::min(end, outputs->next());
-    const double n_steps = std::ceil((event - now) / wanted * (1. - 1e-12));
-    const double dt = (event - now) / n_steps;
-    const unsigned int n_now = std::min<double>(n_steps, steps_between_checks - steps_since_check);
-    const bool reaches_event = n_now == n_steps;
-    for (unsigned int i = 0; i < n_now && !stopped; ++i) {
-      solver->step(dt);
-      steps.add(dt);
-      ++steps_since_check;
-      now = solver->time();
-      stopped = interrupted();
-    }
-    const double lap = seconds();
-    wall.time_loop += lap - clock;
-    if (reaches_event && !stopped) {
-      now = event;
-      solver->set_time(now);
-    }
-    report(now, stopped || now >= end);
-    clock = seconds();
-    wall.output += clock - lap;
-    log.progress(now / planned_end, now, steps.n_steps,
-                 steps.n_steps * double(scene.n_global_points()) / std::max(1e-9, wall.time_loop));
-  }
-}
-
-template <int dim>
 void Simulation<dim>::report(const double time, const bool everything)
 {
-  if (outputs->statistics_times.due(time) || everything) {
+  if (outputs->statistics_times.due(time) || outputs->every_step || everything) {
     const Totals<dim> sums = totals(scene, communicator);
     balances->update(sums, solver->ledger(), communicator);
     outputs->statistics.write(time, steps.n_steps, steps.n_steps ? solver->fields().dt : 0., steps.limit,
@@ -224,7 +115,7 @@ void Simulation<dim>::report(const double time, const bool everything)
   }
   if (outputs->comparison_times.due(time))
     comparison.compare(time, scene, communicator);
-  if (outputs->probes && (outputs->probe_times.due(time) || everything) &&
+  if (outputs->probes && (outputs->probe_times.due(time) || outputs->every_step || everything) &&
       !(steps.n_steps > 0 && outputs->probes->time() == time)) {
     outputs->probes->write(time);
     comparison.compare(*outputs->probes);

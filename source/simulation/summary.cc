@@ -43,14 +43,15 @@ void Simulation<dim>::write_summary() const
   nlohmann::ordered_json summary;
   summary["version"] = PEAT_VERSION;
   summary["case"] = parameters.title.empty() ? options.file : parameters.title;
-  summary["method"] = "mpm";
-  summary["scheme"] = "explicit";
+  const bool fem = parameters.method == Method::fem;
+  summary["method"] = fem ? "fem" : "mpm";
+  summary["scheme"] = unknowns_of_solver() > 0 ? "implicit" : "explicit";
   summary["dimension"] = dim;
   summary["ranks"] = n_ranks;
   summary["completed"] = !stopped && now >= planned_end;
   summary["points"] = n_points;
   summary["active_cells"] = active_cells;
-  summary["dofs"] = n_owned_nodes * dim;
+  summary["dofs"] = unknowns_of_solver() > 0 ? unknowns_of_solver() : n_owned_nodes * dim;
   summary["steps"] = steps.n_steps;
   summary["simulated_time"] = number(now);
   summary["dt"] = {{"min", number(steps.smallest)},

@@ -7,6 +7,8 @@
 #include <deal.II/fe/fe_tools.h>
 #include <deal.II/grid/grid_tools.h>
 
+#include "cell_shapes.h"
+
 namespace peat {
 namespace {
 constexpr unsigned int power(const unsigned int base, const unsigned int exponent)
@@ -90,7 +92,7 @@ void Space<dim>::distribute(const std::vector<CellId> &solid, const std::vector<
     owned_sets.pop_back();
     relevant_sets.pop_back();
   }
-  make_displacement_tables(solid);
+  make_displacement_tables(solid, solid_cell);
   make_pressure_tables(saturated);
 }
 
@@ -109,8 +111,12 @@ unsigned int Space<dim>::boundaries_at(const dealii::Point<dim> &x) const
 }
 
 template <int dim>
-void Space<dim>::make_displacement_tables(const std::vector<CellId> &solid)
+void Space<dim>::make_displacement_tables(std::vector<CellId> solid, const std::vector<char> &solid_cell)
 {
+  for (CellId cell = 0; cell < background.n_local_cells() && kind != Nodes::gimp; ++cell)
+    if (solid_cell[cell] && !background.is_owned(cell))
+      solid.push_back(cell);
+
   const auto &element = displacement_elements[1];
   const unsigned int k = degree<dim>(kind), n = power(k + 1, dim);
   const auto lexicographic = dealii::FETools::hierarchic_to_lexicographic_numbering<dim>(k);
@@ -221,6 +227,43 @@ void Space<dim>::make_pressure_tables(const std::vector<CellId> &saturated)
       pressure_node_list.push_back(node);
     }
   }
+}
+
+template <int dim>
+CellId Space<dim>::solid_cell_at(const dealii::Point<dim> &x) const
+{
+  const double tolerance = 1e-9 * background.smallest_cell_size();
+  for (unsigned int k = 0; k < power(3, dim); ++k) {
+    dealii::Point<dim> near = x;
+    for (unsigned int d = 0, rest = k; d < dim; ++d, rest /= 3)
+      near[d] += rest % 3 == 1 ? -tolerance : rest % 3 == 2 ? tolerance : 0.;
+    const CellId cell = background.cell_at(background.locate(near));
+    if (cell != no_index && is_solid(cell))
+      return cell;
+  }
+  return no_index;
+}
+
+template <int dim>
+dealii::Tensor<1, dim> Space<dim>::value(const dealii::TrilinosWrappers::MPI::Vector &displacement,
+                                         const dealii::Point<dim> &x) const
+{
+  const CellId cell = solid_cell_at(x);
+  if (cell == no_index)
+    return {};
+  double N[64];
+  if (kind == Nodes::q2)
+    shape_functions<dim, 3>(background, cell, x, N);
+  else if (kind == Nodes::q1)
+    shape_functions<dim, 2>(background, cell, x, N);
+  else
+    Assert(false, dealii::ExcMessage("the domain of a point is needed"));
+  dealii::Tensor<1, dim> result;
+  const Index *unknowns = displacements(cell);
+  for (unsigned int i = 0; i < n_nodes; ++i)
+    for (unsigned int d = 0; d < dim; ++d)
+      result[d] += N[i] * displacement(unknowns[i * dim + d]);
+  return result;
 }
 
 template class Space<2>;

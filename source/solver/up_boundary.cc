@@ -1,9 +1,9 @@
 #include <peat/solver/up_boundary.h>
 
 #include <peat/material/mixture.h>
-#include <peat/transfer/weights.h>
-
 #include <deal.II/base/mpi.h>
+
+#include "cell_shapes.h"
 
 namespace peat {
 namespace {
@@ -15,24 +15,6 @@ void coordinates(const dealii::Point<dim> &x, double (&result)[3])
 {
   for (unsigned int d = 0; d < 3; ++d)
     result[d] = d < dim ? x[d] : 0.;
-}
-
-/// The shape functions of a cell at a place within it, x fastest.
-template <int dim, unsigned int reach>
-void shape_functions(const Grid<dim> &grid, const CellId cell, const dealii::Point<dim> &x, double *N)
-{
-  std::array<DirectionWeights<reach>, dim> w;
-  for (unsigned int d = 0; d < dim; ++d) {
-    const double inside =
-        std::min(std::max(x[d], grid.lower(cell, d)), grid.lower(cell, d) + grid.size(cell, d));
-    evaluate_direction(broadcast(inside), Lanes{}, CellInterval::of(grid, cell, d), w[d]);
-  }
-  constexpr unsigned int n = dim == 2 ? reach * reach : reach * reach * reach;
-  for (unsigned int i = 0; i < n; ++i) {
-    N[i] = 1.;
-    for (unsigned int d = 0, rest = i; d < dim; ++d, rest /= reach)
-      N[i] *= w[d].value[rest % reach][0];
-  }
 }
 
 template <int dim>
@@ -277,6 +259,21 @@ void UpBoundary<dim>::prescribe(const double start, const double end, BlockVecto
     unknown.block(1)(local) = given.condition ? given.condition->fluid_value(x, end) : 0.;
   }
   unknown.compress(dealii::VectorOperation::insert);
+}
+
+template <int dim>
+void UpBoundary<dim>::prescribe_velocity(const double time, const double dt,
+                                         dealii::TrilinosWrappers::MPI::Vector &velocity) const
+{
+  double x[3];
+  for (const Motion &motion : motions) {
+    if (!space.owned()[0].is_element(motion.unknown))
+      continue;
+    coordinates(motion.position, x);
+    velocity(motion.unknown) =
+        motion.condition ? motion.condition->displacement_increment(x, time, dt, motion.component) / dt : 0.;
+  }
+  velocity.compress(dealii::VectorOperation::insert);
 }
 
 template <int dim>

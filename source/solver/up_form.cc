@@ -28,8 +28,10 @@ public:
   void update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
                      const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity, bool move,
                      StepWork &work) override;
-  void project_velocity(const Body<dim> &body, const dealii::AffineConstraints<double> &constraints,
-                        BlockVector &momentum, BlockMatrix *matrix) override;
+  void add_momentum(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &momentum) override;
+  void sum_mass(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &mass) override;
+  void sum_weight(const Body<dim> &body, const StepState &state, const VolumeLoads<dim> &loads, double time,
+                  dealii::Tensor<1, dim> &weight, double &work) override;
 
 private:
   using Points = FormPoints<dim, reach>;
@@ -58,8 +60,8 @@ private:
   void add_residual(const Body<dim> &body, const Points &points, const TimeLevel &level,
                     const PointValues &at, const VolumeLoads<dim> &loads, bool has_pressure);
   void add_matrices(const Body<dim> &body, const Points &points, const PointValues &at, bool has_pressure);
-  void stack(const Points &points, const Body<dim> &body, const PointValues &at, bool has_pressure);
-  void close_matrix(const TimeLevel &level, bool has_pressure, bool saturated_inertia);
+  template <typename Term>
+  void sum_over_nodes(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &sums, const Term &term);
   void stabilise(const Body<dim> &body, const Slice &slice, const TimeLevel &level, const CellValues &values,
                  double strength, bool with_matrix);
 
@@ -78,8 +80,7 @@ void PointForm<dim, reach>::load(const CellId cell, const bool saturated, const 
   gather(state.unknown, u, n_u, 0, 0, values.U);
   std::fill_n(values.v_history, n_u, 0.);
   std::fill_n(values.a_history, n_u, 0.);
-  if (level.velocity > 0.)
-    gather(state.rate_history, u, n_u, 0, 0, values.v_history);
+  gather(state.rate_history, u, n_u, 0, 0, values.v_history);
   if (level.acceleration > 0.)
     gather(state.second_history, u, n_u, 0, 0, values.a_history);
   values.has_pressure = saturated && space.has_pressure();
@@ -325,33 +326,62 @@ void PointForm<dim, reach>::update_points(Body<dim> &body, const TimeLevel &leve
 }
 
 template <int dim, unsigned int reach>
-void PointForm<dim, reach>::project_velocity(const Body<dim> &body,
-                                             const dealii::AffineConstraints<double> &constraints,
-                                             BlockVector &momentum, BlockMatrix *matrix)
+template <typename Term>
+void PointForm<dim, reach>::sum_over_nodes(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &sums,
+                                           const Term &term)
 {
   unknowns.resize(n_u);
   local_residual.reinit(n_u);
-  if (matrix)
-    local_matrix.reinit(n_u, n_u);
   for (const Slice &slice : body.slices()) {
     local_residual = 0.;
-    if (matrix)
-      local_matrix = 0.;
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       const Points points(space, body, slice, begin);
-      for (unsigned int i = 0; i < Points::n_nodes; ++i) {
-        const Lanes weight = points.mass * points.N[i];
-        for (unsigned int d = 0; d < dim; ++d)
-          local_residual[i * dim + d] += sum(weight * points.load(body.layout().velocity + d));
-        for (unsigned int j = 0; matrix && j < Points::n_nodes; ++j)
-          for (unsigned int d = 0; d < dim; ++d)
-            local_matrix(i * dim + d, j * dim + d) += sum(weight * points.N[j]);
+      for (unsigned int d = 0; d < dim; ++d) {
+        const Lanes value = points.mass * term(points, d);
+        for (unsigned int i = 0; i < Points::n_nodes; ++i)
+          local_residual[i * dim + d] += sum(points.N[i] * value);
       }
     }
     std::copy_n(space.displacements(slice.cell), n_u, unknowns.begin());
-    momentum.add(unknowns, local_residual);
-    if (matrix)
-      constraints.distribute_local_to_global(local_matrix, unknowns, *matrix);
+    sums.add(unknowns, local_residual);
+  }
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::add_momentum(const Body<dim> &body,
+                                         dealii::TrilinosWrappers::MPI::Vector &momentum)
+{
+  sum_over_nodes(body, momentum, [&](const Points &points, const unsigned int d) {
+    return points.load(body.layout().velocity + d);
+  });
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::sum_mass(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &mass)
+{
+  sum_over_nodes(body, mass, [](const Points &, unsigned int) { return broadcast(1.); });
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::sum_weight(const Body<dim> &body, const StepState &state,
+                                       const VolumeLoads<dim> &loads, const double time,
+                                       dealii::Tensor<1, dim> &weight, double &work)
+{
+  double U[n_u];
+  for (const Slice &slice : body.slices()) {
+    gather(state.unknown, space.displacements(slice.cell), n_u, 0, 0, U);
+    for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
+      const Points points(space, body, slice, begin);
+      for (unsigned int l = 0; l < points.n; ++l) {
+        auto acting = loads.gravity;
+        for (const Condition<dim> *condition : loads.forces)
+          acting += condition->body_force(points.position(body, l), time);
+        weight += points.mass[l] * acting;
+        for (unsigned int d = 0; d < dim; ++d)
+          for (unsigned int i = 0; i < Points::n_nodes; ++i)
+            work += points.mass[l] * acting[d] * points.N[i][l] * U[i * dim + d];
+      }
+    }
   }
 }
 } // namespace

@@ -104,7 +104,7 @@ void UpSolver<dim>::resize()
         const auto *p = unknowns.pressures(slice.cell);
         list.insert(list.end(), p, p + Space<dim>::n_pressures);
       }
-      boundary.constraints().add_entries_local_to_global(list, pattern, false);
+      boundary.constraints().add_entries_local_to_global(list, pattern, true);
     }
   dealii::IndexSet owned(unknowns.n_unknowns()), relevant(unknowns.n_unknowns());
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
@@ -306,6 +306,9 @@ void UpSolver<dim>::accept(const TimeLevel &level)
 {
   share_unknown();
   ghosted_rate = rate;
+  dealii::Tensor<1, dim> weight;
+  double gravity_work = 0.;
+  add_weight(level, weight, gravity_work);
   StepWork work;
   for (const auto &body : scene.bodies)
     form->update_points(*body, level, state, ghosted_rate, volume_loads(level.time).gravity,
@@ -313,10 +316,6 @@ void UpSolver<dim>::accept(const TimeLevel &level)
   const double dt = level.dt;
   const auto held = boundary.reactions(level, residual, unknown);
   const auto &loads = boundary.loads();
-  // Gravity acts on mass, which does not change: its share of the sums is that of the momentum equation.
-  dealii::Tensor<1, dim> weight;
-  double gravity_work = 0.;
-  form_weight(level, weight, gravity_work);
   book.impulse += dt * (held.force + loads.force + weight);
   book.gross_impulse += dt * (held.gross_force + loads.gross_force + weight.norm());
   book.external_work += held.work + loads.work + gravity_work;
@@ -331,6 +330,8 @@ void UpSolver<dim>::accept(const TimeLevel &level)
   int finite = work.finite;
   finite = dealii::Utilities::MPI::min(finite, grid.communicator());
   now += dt;
+  nodal.time = now;
+  nodal.dt = dt;
   if (!finite) {
     std::ostringstream text;
     text << "a stress, pressure or velocity is not finite, t = " << now << " s, step " << dt << " s";
@@ -342,12 +343,11 @@ void UpSolver<dim>::accept(const TimeLevel &level)
 }
 
 template <int dim>
-void UpSolver<dim>::form_weight(const TimeLevel &level, dealii::Tensor<1, dim> &weight, double &work) const
+void UpSolver<dim>::add_weight(const TimeLevel &level, dealii::Tensor<1, dim> &weight, double &work) const
 {
   const VolumeLoads<dim> loads = volume_loads(level.time);
   if (loads.gravity.norm() == 0. && loads.forces.empty())
     return;
-  // The points have taken the step: their displacement of it is that of the unknowns.
   for (const auto &body : scene.bodies)
     form->sum_weight(*body, state, loads, level.time, weight, work);
 }
@@ -355,14 +355,12 @@ void UpSolver<dim>::form_weight(const TimeLevel &level, dealii::Tensor<1, dim> &
 template <int dim>
 void UpSolver<dim>::move_tracers()
 {
-  nodal.dt = 1.;
   if (method == Method::finite_elements) {
     if (!scene.probes)
       return;
     ghosted_total = total;
-    scene.probes->place([&](const dealii::Point<dim> &x, const CellId cell) {
-      return unknowns.value(ghosted_total.block(0), cell, x);
-    });
+    scene.probes->place(
+        [&](const dealii::Point<dim> &x) { return unknowns.value(ghosted_total.block(0), x); });
     return;
   }
   // Tracers know vertices only; what lies between is what the points see, too.

@@ -77,6 +77,9 @@ public:
   /// Kernels note here the points that have left their cell; relocate() finds their new ones.
   std::vector<std::uint32_t> &movers() { return moved_points; }
 
+  /// Note all points that are outside their cell.
+  void note_movers();
+
   struct Relocation
   {
     bool cells_changed = false; ///< a cell got its first point or lost its last one
@@ -95,7 +98,7 @@ public:
   dealii::types::particle_index n_points_at_start() const { return initial_number; }
 
 private:
-  void seed(const BodyParameters<dim> &parameters);
+  void seed(const BodyParameters<dim> &parameters, unsigned int gauss_points);
   /// Make the points' ids, which so far count from 0 on each rank, unique over the ranks.
   void number_points(std::uint32_t n_local);
   void rebuild_slices();

@@ -13,6 +13,8 @@ constexpr unsigned int max_state_columns = 32;
 struct SchemeFields
 {
   bool extent = false;
+  /// Put Gauss points, so many per direction, into full cells instead of evenly spaced points; 0: no.
+  unsigned int gauss_points = 0;
 };
 
 /// The columns of a body's points: what is stored, under which name, and where in the row of a point. A body

@@ -5,6 +5,7 @@
 #include <peat/grid/surface.h>
 #include <peat/points/body.h>
 
+#include <functional>
 #include <vector>
 
 namespace peat {
@@ -28,7 +29,8 @@ public:
   void add(std::uint32_t id, const dealii::Point<dim> &position, const dealii::Tensor<1, dim> &area);
   /// Put tracers on the surface of a shape where this rank's cells are, with the given number of pieces per
   /// cell and direction. Faces that lie on the edge of the mesh are left out.
-  void cover(const Shape<dim> &shape, unsigned int pieces_per_direction);
+  /// With `gauss_points` > 0: so many Gauss points per direction on whole faces of cells.
+  void cover(const Shape<dim> &shape, unsigned int pieces_per_direction, unsigned int gauss_points = 0);
 
   /// Put pieces of surface that are normal to an axis where the body's points see its surface: at the edge of
   /// the points' domains (GIMP), or as high in their cell as the volume of the points below fills it (Q1). A
@@ -45,6 +47,11 @@ public:
 
   /// Move with the nodal velocity for dt; with `stretch`, areas follow the motion too.
   void move(const std::vector<double> &velocity, double dt, bool stretch, const ActiveNodes<dim> &nodes);
+
+  /// Put each tracer where it was at the start, moved by the displacement of that place.
+  void place(const std::function<dealii::Tensor<1, dim>(const dealii::Point<dim> &)> &displacement);
+  /// From now on they count as having started where they are.
+  void restart();
 
   /// Whether a tracer of this rank has gone where another rank must carry it.
   bool leaves_rank() const;

@@ -6,6 +6,8 @@
 #include <peat/points/body.h>
 #include <peat/simulation/output_parameters.h>
 #include <peat/simulation/reference.h>
+#include <peat/solver/implicit_parameters.h>
+#include <peat/solver/linear_solver.h>
 #include <peat/solver/scheme.h>
 
 #include <memory>
@@ -13,13 +15,20 @@
 #include <vector>
 
 namespace peat {
+/// What solves the equations: material points or finite elements.
+enum class Method { mpm, fem };
+
 /// One subsection of `Stages`: a part of the run with its own duration.
 struct StageParameters
 {
   explicit StageParameters(Section section);
 
+  enum class Solver { dynamic, quasi_static, static_state };
+
   std::string name;
-  double duration = 1.; ///< [s]
+  Solver solver = Solver::dynamic;
+  double duration = 0.; ///< [s]
+  bool reset_displacements = false;
   double local_damping = 0.;
 };
 
@@ -36,6 +45,10 @@ struct Case
   const Material &material(const std::string &name) const;
   bool is_saturated() const;
   double end_time() const;
+  /// Whether any stage is solved implicitly.
+  bool is_implicit() const;
+  /// What the points store for the method.
+  SchemeFields fields() const;
 
   Section section; ///< the top of the file
   std::string title;
@@ -44,7 +57,10 @@ struct Case
   std::vector<BodyParameters<dim>> bodies;
   std::vector<std::unique_ptr<Condition<dim>>> conditions;
   Function gravity;
+  Method method;
   SchemeParameters scheme;
+  ImplicitParameters implicit;
+  LinearSolverParameters linear;
   std::vector<StageParameters> stages;
   std::vector<ProbeParameters<dim>> probes;
   std::vector<ReferenceParameters<dim>> references;

@@ -10,6 +10,7 @@
 #include <peat/simulation/statistics.h>
 #include <peat/solver/explicit_mpm.h>
 #include <peat/solver/totals.h>
+#include <peat/solver/up_solver.h>
 
 #include <memory>
 #include <string>
@@ -54,6 +55,12 @@ public:
 private:
   struct Outputs;
   void run_stage(const StageParameters &stage, double start);
+  void run_explicit_stage(const StageParameters &stage, double start);
+  void run_implicit_stage(const StageParameters &stage, double start);
+  void run_static_stage(const StageParameters &stage, double start);
+  void begin_stage(const StageParameters &stage, const StableStep &step);
+  void make_up_solver(double start);
+  unsigned long unknowns_of_solver() const;
   void report(double time, bool everything);
   void write_summary() const;
   std::vector<typename Comparison<dim>::Result> compare_with_references() const;
@@ -70,7 +77,8 @@ private:
   Comparison<dim> comparison;
   const std::string directory;
   Log log;
-  std::unique_ptr<ExplicitMPM<dim>> solver;
+  std::unique_ptr<Solver<dim>> solver;
+  UpSolver<dim> *up_solver = nullptr; ///< the same, if it is one
   SchemeParameters stage_scheme;
   std::unique_ptr<Balances<dim>> balances;
   std::unique_ptr<Outputs> outputs;

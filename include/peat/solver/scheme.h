@@ -18,7 +18,12 @@ struct SchemeParameters
     modified_last ///< MUSL: from the points' new velocities, mapped back to the nodes
   };
 
-  SchemeFields fields() const { return {basis == Basis::gimp}; }
+  SchemeFields fields() const
+  {
+    SchemeFields fields;
+    fields.extent = basis == Basis::gimp;
+    return fields;
+  }
   /// Share of the points' own velocity that survives a step of length dt.
   double retention(double dt) const;
 

@@ -5,6 +5,7 @@
 #include <deal.II/base/index_set.h>
 #include <deal.II/dofs/dof_handler.h>
 #include <deal.II/hp/fe_collection.h>
+#include <deal.II/lac/trilinos_vector.h>
 
 #include <array>
 #include <vector>
@@ -42,7 +43,7 @@ public:
   static constexpr unsigned int n_pressures = 1 << dim;
   bool has_pressure() const { return n_global[1] > 0; }
 
-  /// `n_cell_nodes() * dim` unknowns of a cell that holds points.
+  /// `n_cell_nodes() * dim` unknowns of a cell that holds points, of this rank or (not with `gimp`) a ghost.
   const Index *displacements(const CellId cell) const
   {
     return &displacement_table[std::size_t(slot[cell]) * n_nodes * dim];
@@ -82,6 +83,12 @@ public:
   };
   const std::vector<PressureNode> &pressure_nodes() const { return pressure_node_list; }
 
+  /// A displacement field (with ghosts) at a place in a cell that holds points, or on its edge; zero elsewhere.
+  dealii::Tensor<1, dim> value(const dealii::TrilinosWrappers::MPI::Vector &displacement,
+                               const dealii::Point<dim> &x) const;
+  /// A cell that holds points and contains the place, or no_index.
+  CellId solid_cell_at(const dealii::Point<dim> &x) const;
+
   /// The mesh's faces on which a place lies, as bits.
   unsigned int boundaries_at(const dealii::Point<dim> &x) const;
   const Grid<dim> &grid() const { return background; }
@@ -92,7 +99,7 @@ private:
   std::vector<char> with_ghosts(const std::vector<CellId> &cells) const;
   void number(dealii::DoFHandler<dim> &handler, const dealii::hp::FECollection<dim> &elements,
               const std::vector<char> &active, unsigned int block);
-  void make_displacement_tables(const std::vector<CellId> &solid);
+  void make_displacement_tables(std::vector<CellId> solid, const std::vector<char> &solid_cell);
   void find_vertices();
   void make_patches(const std::vector<CellId> &solid);
   void make_pressure_tables(const std::vector<CellId> &saturated);

@@ -31,6 +31,9 @@ public:
   /// Set the prescribed displacements since `start` and pressures at `end` in a vector of this rank's unknowns.
   void prescribe(double start, double end, BlockVector &unknown) const;
 
+  /// The same of velocities: means over the time from `time` to `time + dt`.
+  void prescribe_velocity(double time, double dt, dealii::TrilinosWrappers::MPI::Vector &velocity) const;
+
   /// Add surface forces, fluxes and penalties.
   void assemble(const TimeLevel &level, const StepState &state, BlockVector &residual, BlockMatrix *matrix);
 

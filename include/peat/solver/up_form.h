@@ -88,8 +88,12 @@ public:
                              const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity, bool move,
                              StepWork &work) = 0;
 
-  /// Add sum m N_i v of the points, and sum m N_i N_j (if `matrix` is not null), to project velocities.
-  virtual void project_velocity(const Body<dim> &body, const dealii::AffineConstraints<double> &constraints,
-                                BlockVector &momentum, BlockMatrix *matrix) = 0;
+  /// Add sum m N_i v of the points.
+  virtual void add_momentum(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &momentum) = 0;
+  /// Add sum m N_i.
+  virtual void sum_mass(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &mass) = 0;
+  /// Sum of the points' weights and other body forces, and their work on U.
+  virtual void sum_weight(const Body<dim> &body, const StepState &state, const VolumeLoads<dim> &loads,
+                          double time, dealii::Tensor<1, dim> &weight, double &work) = 0;
 };
 } // namespace peat

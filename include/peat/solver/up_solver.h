@@ -89,6 +89,7 @@ private:
   void share_unknown();
   /// After the unknowns have been found: points, tracers, balances.
   void accept(const TimeLevel &level);
+  void add_weight(const TimeLevel &level, dealii::Tensor<1, dim> &weight, double &work) const;
   void move_tracers();
   void relocate_points();
   TimeLevel level(double time, double dt) const;
@@ -122,7 +123,8 @@ private:
   double next_step = 0.; ///< quasi-static [s]
   bool first_step_done = false;
   double pressure_scale = 0., displacement_scale = 0.;
-  std::array<double, 2> residual_scale{};
+  std::array<double, 2> residual_scale{}; ///< largest residuals so far: momentum [N], fluid [m^dim/s]
+  double fluid_scale_before = 1.;
   NodalFields<dim> nodal;
   Ledger<dim> book;
   Work done;

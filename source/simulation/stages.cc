@@ -1,0 +1,166 @@
+#include <peat/simulation/simulation.h>
+
+#include <sstream>
+
+#include "outputs.h"
+
+namespace peat {
+template <int dim>
+void Simulation<dim>::run_stage(const StageParameters &stage, const double start)
+{
+  const bool implicit = parameters.method == Method::fem || stage.solver != StageParameters::Solver::dynamic;
+  outputs->plan(parameters.output, comparison, start, start + stage.duration,
+                stage.solver == StageParameters::Solver::quasi_static);
+  if (stage.solver == StageParameters::Solver::static_state)
+    run_static_stage(stage, start);
+  else if (implicit)
+    run_implicit_stage(stage, start);
+  else
+    run_explicit_stage(stage, start);
+}
+
+template <int dim>
+void Simulation<dim>::begin_stage(const StageParameters &stage, const StableStep &step)
+{
+  std::ostringstream message;
+  message << "stage '" << stage.name << "': " << stage.duration << " s, "
+          << (unknowns_of_solver() == 0 ? "stable step " : "first step ") << step.dt << " s (" << step.limit << ')';
+  if (unknowns_of_solver() > 0)
+    message << ", " << unknowns_of_solver() << " unknowns";
+  log.line(message.str());
+  if (steps.n_steps == 0)
+    report(now, true);
+}
+
+template <int dim>
+unsigned long Simulation<dim>::unknowns_of_solver() const
+{
+  return up_solver ? up_solver->space().n_unknowns() : 0;
+}
+
+template <int dim>
+void Simulation<dim>::make_up_solver(const double start)
+{
+  const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
+  // Finite elements keep their nodal values from stage to stage.
+  if (up_solver && parameters.method == Method::fem)
+    return;
+  const bool fem = parameters.method == Method::fem;
+  const Nodes nodes = fem                                      ? parameters.implicit.element
+                      : parameters.scheme.basis == Basis::gimp ? Nodes::gimp
+                                                               : Nodes::q1;
+  auto made = std::make_unique<UpSolver<dim>>(
+      parameters.implicit, parameters.linear,
+      fem ? UpSolver<dim>::Method::finite_elements : UpSolver<dim>::Method::material_points, nodes,
+      parameters.scheme.seepage_inertia, grid, scene, start, carried);
+  made->prepare();
+  up_solver = made.get();
+  solver = std::move(made);
+}
+
+template <int dim>
+void Simulation<dim>::run_static_stage(const StageParameters &stage, const double start)
+{
+  const double clock = seconds();
+  make_up_solver(start);
+  log.line("stage '" + stage.name + "': static, " + std::to_string(unknowns_of_solver()) + " unknowns");
+  up_solver->solve_static();
+  if (stage.reset_displacements)
+    up_solver->reset_displacements();
+  steps.add(0.);
+  wall.time_loop += seconds() - clock;
+  report(now, true);
+}
+
+template <int dim>
+void Simulation<dim>::run_implicit_stage(const StageParameters &stage, const double start)
+{
+  using Mode = typename UpSolver<dim>::Mode;
+  const double end = start + stage.duration;
+  make_up_solver(start);
+  up_solver->start(stage.solver == StageParameters::Solver::quasi_static ? Mode::quasi_static : Mode::dynamic);
+  begin_stage(stage, up_solver->suggested_step());
+  double clock = seconds();
+  while (now < end && !stopped) {
+    const double event = std::min(end, outputs->next());
+    steps.limit = up_solver->suggested_step().limit;
+    steps.add(up_solver->step(event));
+    now = up_solver->time();
+    stopped = interrupted();
+    const double lap = seconds();
+    wall.time_loop += lap - clock;
+    if (now >= event * (1. - 1e-12)) {
+      now = event;
+      up_solver->set_time(now);
+    }
+    report(now, stopped || now >= end);
+    clock = seconds();
+    wall.output += clock - lap;
+    log.progress(now / planned_end, now, steps.n_steps,
+                 steps.n_steps * double(scene.n_global_points()) / std::max(1e-9, wall.time_loop));
+  }
+}
+
+template <int dim>
+void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const double start)
+{
+  const double end = start + stage.duration;
+  stage_scheme.local_damping = std::max(parameters.scheme.local_damping, stage.local_damping);
+  const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
+  up_solver = nullptr;
+  auto made = std::make_unique<ExplicitMPM<dim>>(stage_scheme, grid, scene, start, carried);
+  ExplicitMPM<dim> &mpm = *made;
+  solver = std::move(made);
+  mpm.prepare();
+  begin_stage(stage, mpm.stable_step());
+
+  // Between two events the step is constant, unless the stable step has changed by then.
+  constexpr unsigned int steps_between_checks = 100;
+  unsigned int steps_since_check = 0;
+  StableStep stable = mpm.stable_step();
+  double clock = seconds();
+  while (now < end && !stopped) {
+    if (steps_since_check >= steps_between_checks) {
+      stable = mpm.stable_step();
+      steps_since_check = 0;
+    }
+    const double wanted =
+        stage_scheme.fixed_step > 0. ? stage_scheme.fixed_step : stage_scheme.step_factor * stable.dt;
+    if (stage_scheme.fixed_step > stable.dt) {
+      std::ostringstream message;
+      message << "'Time step' " << wanted << " s is above the stable step " << stable.dt << " s ("
+              << stable.limit << ") at t = " << now << " s";
+      throw NumericalError(message.str());
+    }
+    steps.limit = stable.limit;
+    const double event = std::min(end, outputs->next());
+    const double n_steps = std::ceil((event - now) / wanted * (1. - 1e-12));
+    const double dt = (event - now) / n_steps;
+    const unsigned int n_now = std::min<double>(n_steps, steps_between_checks - steps_since_check);
+    const bool reaches_event = n_now == n_steps;
+    for (unsigned int i = 0; i < n_now && !stopped; ++i) {
+      mpm.step(dt);
+      steps.add(dt);
+      ++steps_since_check;
+      now = mpm.time();
+      stopped = interrupted();
+    }
+    const double lap = seconds();
+    wall.time_loop += lap - clock;
+    if (reaches_event && !stopped) {
+      now = event;
+      mpm.set_time(now);
+    }
+    report(now, stopped || now >= end);
+    clock = seconds();
+    wall.output += clock - lap;
+    log.progress(now / planned_end, now, steps.n_steps,
+                 steps.n_steps * double(scene.n_global_points()) / std::max(1e-9, wall.time_loop));
+  }
+}
+
+template unsigned long Simulation<2>::unknowns_of_solver() const;
+template unsigned long Simulation<3>::unknowns_of_solver() const;
+template void Simulation<2>::run_stage(const StageParameters &, double);
+template void Simulation<3>::run_stage(const StageParameters &, double);
+} // namespace peat

@@ -1,0 +1,295 @@
+#include <peat/solver/up_solver.h>
+
+#include <peat/material/mixture.h>
+
+#include <deal.II/base/mpi.h>
+
+#include <sstream>
+
+// The levels of time at which the equations hold: static, quasi-static (a diagonally implicit Runge-Kutta
+// method) and dynamic (generalised-alpha; theory.md, implicit steps).
+
+namespace peat {
+namespace {
+/// Of the two-stage, second-order, L-stable diagonally implicit method (Alexander 1977).
+const double stage_share = 1. - std::sqrt(0.5);
+} // namespace
+
+template <int dim>
+void UpSolver<dim>::solve_static()
+{
+  if (unknowns.has_pressure() && !boundary.prescribes_pressure())
+    throw NumericalError("a static state needs a place where the pore pressure is given: a free surface, or a "
+                         "condition of kind 'pressure'");
+  TimeLevel level = this->level(now, 0.);
+  rate = 0.;
+  state.rate_history = 0.;
+  state.second_history = second;
+  unknown = second;
+  unknown.block(0) = 0.;
+  solve(level, now, now);
+  accept(level);
+  first_step_done = false;
+}
+
+template <int dim>
+void UpSolver<dim>::start(const Mode stage_mode)
+{
+  mode = stage_mode;
+  damped_steps_left = parameters.start_steps;
+  next_step = 0.;
+  first_step_done = false;
+  rate = 0.;
+  second.block(0) = 0.;
+  if (mode == Mode::quasi_static)
+    return;
+
+  // First v and then a and p_t from one matrix: that of the rates alone, [[M, 0], [-G, -S]].
+  TimeLevel level = this->level(now, 0.);
+  level.share = 0.;
+  level.acceleration = 1.;
+  level.pressure_rate = unknowns.has_pressure() ? 1. : 0.;
+  unknown = second;
+  unknown.block(0) = 0.;
+  state.rate_history = 0.;
+  state.second_history = second;
+  assemble(level, true);
+  right_side = 0.;
+  for (const auto &body : scene.bodies)
+    form->add_momentum(*body, right_side.block(0));
+  right_side.compress(dealii::VectorOperation::add);
+  boundary.constraints().set_zero(right_side);
+  correction = 0.;
+  if (right_side.l2_norm() > 0.)
+    linear_solver.solve(correction, right_side);
+  rate.block(0) = correction.block(0);
+  boundary.prescribe_velocity(now, 1e-3 * suggested_step().dt, rate.block(0));
+
+  BlockVector history = rate;
+  if (unknowns.has_pressure())
+    history.block(1) = 0.;
+  state.rate_history = history;
+  assemble(level, false);
+  correction = 0.;
+  if (right_side.l2_norm() > 0.)
+    linear_solver.solve(correction, right_side);
+  second.block(0) = correction.block(0);
+  if (unknowns.has_pressure())
+    rate.block(1) = correction.block(1);
+  matrix_is_valid = false;
+}
+
+template <int dim>
+StableStep UpSolver<dim>::suggested_step() const
+{
+  if (parameters.fixed_step > 0.)
+    return {parameters.fixed_step, "'Time step'"};
+  if (mode == Mode::quasi_static && next_step > 0.)
+    return {next_step, "error of the step"};
+  if (mode == Mode::quasi_static && parameters.first_step > 0.)
+    return {parameters.first_step, "'First step'"};
+  StableStep best{std::numeric_limits<double>::max(), ""};
+  const double h = grid.smallest_cell_size();
+  for (const auto &body : scene.bodies) {
+    const Material &material = body->material();
+    const double M = material.initial_modulus();
+    const Mixture *mixture = material.mixture();
+    double dt = parameters.step_factor * h / std::sqrt(M / material.density());
+    std::string limit = "wave over a cell in '" + body->name() + "'";
+    if (mixture && mode == Mode::dynamic)
+      dt = parameters.step_factor * h / mixture->undrained_speed(M);
+    if (mixture && mode == Mode::quasi_static) {
+      dt = 0.25 * h * h * (mixture->storage() + std::pow(mixture->biot_coefficient(), 2) / M) / mixture->mobility();
+      limit = "diffusion over half a cell in '" + body->name() + "'";
+    }
+    if ((mixture || mode == Mode::dynamic) && dt < best.dt)
+      best = {dt, limit};
+  }
+  return best;
+}
+
+template <int dim>
+double UpSolver<dim>::step(const double latest)
+{
+  if (mode == Mode::quasi_static)
+    return quasi_static_step(latest);
+  const double remaining = latest - now, wanted = suggested_step().dt;
+  const double dt = remaining / std::ceil(remaining / wanted * (1. - 1e-12));
+  dynamic_step(dt);
+  return dt;
+}
+
+template <int dim>
+void UpSolver<dim>::dynamic_step(const double dt)
+{
+  if (damped_steps_left == 0)
+    return generalised_alpha_step(dt);
+  --damped_steps_left;
+  damped_step(0.5 * dt);
+  damped_step(0.5 * dt);
+}
+
+template <int dim>
+void UpSolver<dim>::damped_step(const double dt)
+{
+  TimeLevel level = this->level(now + dt, dt);
+  level.velocity = level.pressure_rate = 1. / dt;
+  level.acceleration = 1. / (dt * dt);
+  BlockVector history = second;
+  history.block(0).equ(-1. / dt, rate.block(0));
+  state.rate_history = 0.;
+  state.second_history = history;
+  unknown = second;
+  unknown.block(0).equ(dt, rate.block(0));
+  solve(level, now, now + dt);
+
+  second.block(0).equ(-1. / dt, rate.block(0));
+  rate.block(0).equ(1. / dt, unknown.block(0));
+  second.block(0).add(1. / dt, rate.block(0));
+  if (unknowns.has_pressure()) {
+    rate.block(1).equ(1. / dt, unknown.block(1));
+    rate.block(1).add(-1. / dt, second.block(1));
+  }
+  accept(level);
+}
+
+template <int dim>
+void UpSolver<dim>::generalised_alpha_step(const double dt)
+{
+  // Chung and Hulbert (1993) for the motion, Jansen, Whiting and Hulbert (2000) for the pressure, with the
+  // shares of the new values: of u, v, p, of a, and of p_t.
+  const double r = parameters.spectral_radius;
+  const double share = 1. / (1. + r), share_a = (2. - r) / (1. + r), share_p = 0.5 * (3. - r) / (1. + r);
+  const double beta = 0.25 * std::pow(1. + share_a - share, 2), gamma = 0.5 + share_a - share;
+  const double gamma_p = 0.5 + share_p - share;
+
+  TimeLevel level = this->level(now + share * dt, dt);
+  level.share = share;
+  level.velocity = share * gamma / (beta * dt);
+  level.acceleration = share_a / (beta * dt * dt);
+  level.pressure_rate = share_p / (gamma_p * dt);
+
+  BlockVector first = rate, next = second;
+  first.block(0) *= 1. - share * gamma / beta;
+  first.block(0).add(share * dt * (1. - 0.5 * gamma / beta), second.block(0));
+  next.block(0) *= 1. - share_a * 0.5 / beta;
+  next.block(0).add(-share_a / (beta * dt), rate.block(0));
+  if (unknowns.has_pressure())
+    first.block(1) *= 1. - share_p / gamma_p;
+  state.rate_history = first;
+  state.second_history = next;
+  unknown = second;
+  unknown.block(0).equ(dt, rate.block(0));
+  unknown.block(0).add(0.5 * dt * dt, second.block(0));
+  solve(level, now, now + dt);
+
+  first = rate;
+  next.block(0) = second.block(0);
+  rate.block(0).equ(gamma / (beta * dt), unknown.block(0));
+  rate.block(0).add(1. - gamma / beta, first.block(0), dt * (1. - 0.5 * gamma / beta), next.block(0));
+  second.block(0).equ(1. / (beta * dt * dt), unknown.block(0));
+  second.block(0).add(-1. / (beta * dt), first.block(0), 1. - 0.5 / beta, next.block(0));
+  if (unknowns.has_pressure()) {
+    rate.block(1).equ(1. / (gamma_p * dt), unknown.block(1));
+    rate.block(1).add(-1. / (gamma_p * dt), second.block(1), 1. - 1. / gamma_p, first.block(1));
+  }
+  accept(level);
+}
+
+template <int dim>
+double UpSolver<dim>::quasi_static_step(const double latest)
+{
+  constexpr unsigned int most_attempts = 30;
+  double dt = std::min(suggested_step().dt, latest - now);
+  for (unsigned int attempt = 0; attempt < most_attempts; ++attempt) {
+    // A rest that is shorter than a tenth of a step is shared with this one.
+    if (dt < latest - now && latest - now < 1.1 * dt)
+      dt = 0.5 * (latest - now);
+    const bool ends_there = dt >= (latest - now) * (1. - 1e-9);
+    if (ends_there)
+      dt = latest - now;
+    const double error = diagonally_implicit_step(dt);
+    // What loads do that jump is no error that shorter steps could reduce.
+    const bool free = parameters.fixed_step > 0. || !first_step_done;
+    if (free || error <= parameters.step_tolerance) {
+      const double growth = std::min(
+          parameters.largest_growth, 0.8 * std::sqrt(parameters.step_tolerance / std::max(error, 1e-300)));
+      const double before = std::max(dt, ends_there ? next_step : 0.);
+      next_step = parameters.fixed_step > 0. ? parameters.fixed_step
+                  : !first_step_done         ? dt
+                                             : std::max(dt * growth, ends_there && growth > 1. ? before : 0.);
+      first_step_done = true;
+      TimeLevel level = this->level(now + dt, dt);
+      level.velocity = level.pressure_rate = 1. / (stage_share * dt);
+      accept(level);
+      return dt;
+    }
+    ++done.rejected_steps;
+    dt *= std::max(0.2, 0.8 * std::sqrt(parameters.step_tolerance / error));
+  }
+  std::ostringstream text;
+  text << "no step after t = " << now << " s is accurate to 'Step tolerance', the last was " << dt
+       << " s; loads that jump belong to the start of a stage";
+  throw NumericalError(text.str());
+}
+
+template <int dim>
+double UpSolver<dim>::diagonally_implicit_step(const double dt)
+{
+  const double g = stage_share;
+  TimeLevel level = this->level(now + g * dt, dt);
+  level.velocity = level.pressure_rate = 1. / (g * dt);
+  state.rate_history = 0.;
+  BlockVector old = second;
+  old.block(0) = 0.;
+  state.second_history = old;
+  unknown = old;
+  solve(level, now, now + g * dt);
+
+  // k_1 = (Y_1 - y_n)/(g dt);  k_2 = (Y_2 - y_n)/(g dt) - (1 - g)/g k_1
+  BlockVector first = unknown;
+  first -= old;
+  first *= 1. / (g * dt);
+  BlockVector history = first;
+  history *= -(1. - g) / g;
+  state.rate_history = history;
+  level.time = now + dt;
+  solve(level, now, now + dt);
+
+  // Against the first-order y_n + dt k_1.
+  BlockVector difference = unknown;
+  difference -= old;
+  for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
+    rate.block(b).equ(1. / (g * dt), difference.block(b));
+    rate.block(b).add(1., history.block(b));
+  }
+  difference.add(-dt, first);
+  BlockVector moved = total;
+  moved += unknown;
+  displacement_scale = std::max(displacement_scale, moved.block(0).linfty_norm());
+  const auto relative = [&](const unsigned int block, const double scale) {
+    return scale > 0. ? difference.block(block).l2_norm() / std::sqrt(double(difference.block(block).size())) / scale
+                      : 0.;
+  };
+  double error = relative(0, displacement_scale);
+  if (unknowns.has_pressure()) {
+    pressure_scale = std::max(pressure_scale, unknown.block(1).linfty_norm());
+    error = std::max(error, relative(1, pressure_scale));
+  }
+  return error;
+}
+
+#define PEAT_INSTANTIATE(dim)                                                                                \
+  template void UpSolver<dim>::solve_static();                                                               \
+  template void UpSolver<dim>::start(Mode);                                                                  \
+  template StableStep UpSolver<dim>::suggested_step() const;                                                 \
+  template double UpSolver<dim>::step(double);                                                               \
+  template void UpSolver<dim>::dynamic_step(double);                                                         \
+  template void UpSolver<dim>::damped_step(double);                                                          \
+  template void UpSolver<dim>::generalised_alpha_step(double);                                               \
+  template double UpSolver<dim>::quasi_static_step(double);                                                  \
+  template double UpSolver<dim>::diagonally_implicit_step(double);
+PEAT_INSTANTIATE(2)
+PEAT_INSTANTIATE(3)
+#undef PEAT_INSTANTIATE
+} // namespace peat
