@@ -119,7 +119,7 @@ typename Comparison<dim>::Norms merge_ranks(const typename Comparison<dim>::Norm
 
 template <int dim>
 Comparison<dim>::Comparison(const Case<dim> &parameters, const std::string &directory)
-    : time_tolerance(1e-9 * parameters.end_time())
+    : finite_elements(parameters.method == Method::fem), time_tolerance(1e-9 * parameters.end_time())
 {
   for (const ReferenceParameters<dim> &given : parameters.references) {
     require_field(parameters, given.body, given.field, given.section, "Field");
@@ -221,8 +221,8 @@ void Comparison<dim>::compare(const double time, const Scene<dim> &scene, MPI_Co
       if (is_done || std::abs(reference.times[k] - time) > time_tolerance)
         continue;
       const Curve *curve = reference.curves.empty() ? nullptr : &reference.curves[k];
-      const bool points = reference.parameters->single_points && !curve;
-      const Norms mine = points ? compare_points(reference, reference.times[k], scene)
+      const bool points = finite_elements || (reference.parameters->single_points && !curve);
+      const Norms mine = points ? compare_points(reference, curve, reference.times[k], scene)
                                 : compare_cells(reference, curve, reference.times[k], scene);
       reference.done.push_back(merge_ranks<dim>(mine, communicator));
     }
@@ -248,7 +248,8 @@ typename Comparison<dim>::Norms Comparison<dim>::compare_cells(const Reference &
 }
 
 template <int dim>
-typename Comparison<dim>::Norms Comparison<dim>::compare_points(const Reference &reference, const double time,
+typename Comparison<dim>::Norms Comparison<dim>::compare_points(const Reference &reference, const Curve *curve,
+                                                                const double time,
                                                                 const Scene<dim> &scene) const
 {
   Norms norms;
@@ -263,7 +264,7 @@ typename Comparison<dim>::Norms Comparison<dim>::compare_points(const Reference 
       dealii::Point<dim> x = body->position(handle);
       for (unsigned int d = 0; d < dim && at_start; ++d)
         x[d] -= row[body->layout().displacement + d];
-      accumulate<dim>(norms, row[body->layout().volume], access(row), expected(reference, nullptr, x, time),
+      accumulate<dim>(norms, row[body->layout().volume], access(row), expected(reference, curve, x, time),
                       body->position(handle));
     }
   }

@@ -34,10 +34,10 @@ UpBoundary<dim>::UpBoundary(const Space<dim> &space, const Scene<dim> &scene, co
 {}
 
 template <int dim>
-void UpBoundary<dim>::locate(const ActiveNodes<dim> &active, const std::vector<Index> &unused)
+void UpBoundary<dim>::locate(const ActiveNodes<dim> &active, const std::vector<Index> &unused_unknowns)
 {
   find_motions();
-  for (const Index unknown : unused)
+  for (const Index unknown : unused_unknowns)
     motions.push_back({unknown, 0, {}, nullptr});
   pressures.clear();
   if (space.has_pressure())
@@ -61,6 +61,11 @@ void UpBoundary<dim>::locate(const ActiveNodes<dim> &active, const std::vector<I
   for (const GivenPressure &given : pressures)
     homogeneous.add_line(given.unknown);
   homogeneous.close();
+  unused_only.clear();
+  unused_only.reinit(relevant);
+  for (const Index unknown : unused_unknowns)
+    unused_only.add_line(unknown);
+  unused_only.close();
 }
 
 template <int dim>

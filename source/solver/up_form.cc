@@ -15,6 +15,11 @@ void gather(const BlockVector &vector, const dealii::types::global_dof_index *un
     result[i] = part(unknowns[i] - offset);
 }
 
+Lanes sum_of_squares(const StressLanes &s)
+{
+  return s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + s[3] * s[3] + s[4] * s[4] + s[5] * s[5];
+}
+
 template <int dim, unsigned int reach>
 class PointForm : public UpForm<dim>
 {
@@ -24,7 +29,7 @@ public:
   void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
                 const VolumeLoads<dim> &loads, double stabilisation,
                 const dealii::AffineConstraints<double> &constraints, BlockVector &residual,
-                BlockMatrix *matrix) override;
+                BlockMatrix *matrix, GrossResidual &gross) override;
   void update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
                      const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity, bool move,
                      StepWork &work) override;
@@ -58,7 +63,8 @@ private:
   void evaluate(const Body<dim> &body, const Points &points, const TimeLevel &level, const CellValues &values,
                 double mean_pressure, PointValues &at) const;
   void add_residual(const Body<dim> &body, const Points &points, const TimeLevel &level,
-                    const PointValues &at, const VolumeLoads<dim> &loads, bool has_pressure);
+                    const PointValues &at, const VolumeLoads<dim> &loads, bool has_pressure,
+                    GrossResidual &gross);
   void add_matrices(const Body<dim> &body, const Points &points, const PointValues &at, bool has_pressure);
   template <typename Term>
   void sum_over_nodes(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &sums, const Term &term);
@@ -135,7 +141,7 @@ void PointForm<dim, reach>::evaluate(const Body<dim> &body, const Points &points
 template <int dim, unsigned int reach>
 void PointForm<dim, reach>::add_residual(const Body<dim> &body, const Points &points, const TimeLevel &level,
                                          const PointValues &at, const VolumeLoads<dim> &loads,
-                                         const bool has_pressure)
+                                         const bool has_pressure, GrossResidual &gross)
 {
   const Mixture *mixture = body.material().mixture();
   const Lanes V = points.volume, m = points.mass;
@@ -153,6 +159,8 @@ void PointForm<dim, reach>::add_residual(const Body<dim> &body, const Points &po
   if (mixture)
     for (unsigned int c = 0; c < 3; ++c)
       total[c] -= mixture->biot_coefficient() * at.pressure;
+  gross[0] += sum(V * (sqrt(sum_of_squares(at.stress)) + sqrt(at.pressure * at.pressure))) /
+              space.grid().smallest_cell_size();
   for (unsigned int i = 0; i < Points::n_nodes; ++i)
     for (unsigned int d = 0; d < dim; ++d) {
       Lanes r = points.N[i] * force[d];
@@ -171,6 +179,12 @@ void PointForm<dim, reach>::add_residual(const Body<dim> &body, const Points &po
     for (unsigned int l = 0; l < points.n; ++l)
       storage[l] -= condition->fluid_source(points.position(body, l), level.time);
   const Lanes mobility = V * mixture->mobility(porosity);
+  Lanes slope = {};
+  for (unsigned int d = 0; d < dim; ++d)
+    slope += at.pressure_gradient[d] * at.pressure_gradient[d];
+  gross[1] += std::abs(scale) * sum(mobility * sqrt(slope) / space.grid().smallest_cell_size() +
+                                    V * level.pressure_rate * mixture->storage(porosity) *
+                                        sqrt(at.pressure * at.pressure));
   std::array<Lanes, dim> flux;
   for (unsigned int d = 0; d < dim; ++d)
     flux[d] = mobility * (mixture->fluid_density() * (loads.gravity[d] - inertia * at.acceleration[d]) -
@@ -236,7 +250,8 @@ template <int dim, unsigned int reach>
 void PointForm<dim, reach>::assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
                                      const VolumeLoads<dim> &loads, const double stabilisation,
                                      const dealii::AffineConstraints<double> &constraints,
-                                     BlockVector &residual, BlockMatrix *matrix)
+                                     BlockVector &residual, BlockMatrix *matrix,
+                                     GrossResidual &gross)
 {
   const bool saturated = body.material().mixture() != nullptr;
   const bool has_pressure = saturated && space.has_pressure();
@@ -255,7 +270,7 @@ void PointForm<dim, reach>::assemble(const Body<dim> &body, const TimeLevel &lev
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       const Points points(space, body, slice, begin);
       evaluate(body, points, level, values, mean, at);
-      add_residual(body, points, level, at, loads, has_pressure);
+      add_residual(body, points, level, at, loads, has_pressure, gross);
       if (matrix || (has_pressure && stabilisation > 0.))
         add_matrices(body, points, at, has_pressure);
     }

@@ -160,26 +160,32 @@ void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
     matrix = 0.;
   share_unknown();
   const VolumeLoads<dim> loads = volume_loads(level.time);
+  gross = {};
   const double stabilisation = unknowns.nodes() == Nodes::q2 ? 0. : parameters.stabilisation;
   for (const auto &body : scene.bodies)
     form->assemble(*body, level, state, loads, stabilisation, boundary.constraints(), residual,
-                   with_matrix ? &matrix : nullptr);
+                   with_matrix ? &matrix : nullptr, gross);
   boundary.assemble(level, state, residual, with_matrix ? &matrix : nullptr);
   residual.compress(dealii::VectorOperation::add);
   right_side = residual;
   boundary.constraints().set_zero(right_side);
   if (!with_matrix)
     return;
-  // What is prescribed stands for itself.
-  for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
-    for (const auto index : unknowns.owned()[b])
-      if (boundary.constraints().is_constrained(index + b * unknowns.first_pressure()) &&
-          matrix.block(b, b).diag_element(index) == 0.)
-        matrix.block(b, b).set(index, index, b == 0 ? 1. : level.fluid_scale());
-  matrix.compress(dealii::VectorOperation::unknown);
+  fill_empty_diagonal(level);
   matrix_level = level;
   matrix_is_valid = true;
   linear_solver.prepare(matrix);
+}
+
+template <int dim>
+void UpSolver<dim>::fill_empty_diagonal(const TimeLevel &level)
+{
+  matrix.compress(dealii::VectorOperation::add);
+  for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
+    for (const auto index : unknowns.owned()[b])
+      if (matrix.block(b, b).diag_element(index) == 0.)
+        matrix.block(b, b).set(index, index, b == 0 ? 1. : level.fluid_scale());
+  matrix.compress(dealii::VectorOperation::insert);
 }
 
 template <int dim>
@@ -197,7 +203,9 @@ bool UpSolver<dim>::needs_matrix(const TimeLevel &level) const
 template <int dim>
 double UpSolver<dim>::residual_norm(const unsigned int block) const
 {
-  const double scale = residual_scale[block];
+  constexpr double round_off = 1e-14;
+  const double floor = round_off * dealii::Utilities::MPI::sum(gross[block], grid.communicator());
+  const double scale = std::max(residual_scale[block], floor / parameters.newton_tolerance);
   return scale > 0. ? right_side.block(block).l2_norm() / scale : 0.;
 }
 
@@ -237,9 +245,7 @@ void UpSolver<dim>::solve(const TimeLevel &level, const double start, const doub
       text << "); use shorter steps, or more 'Newton iterations'";
       throw NumericalError(text.str());
     }
-    if (iteration > 0 && converged())
-      return;
-    if (iteration == 0 && right_side.l2_norm() == 0.)
+    if ((iteration > 0 && converged()) || right_side.l2_norm() == 0.)
       return;
     correction = 0.;
     done.linear_iterations += linear_solver.solve(correction, right_side);
@@ -287,13 +293,11 @@ void UpSolver<dim>::project_start()
   residual = 0.;
   matrix = 0.;
   share_unknown();
-  dealii::AffineConstraints<double> none;
-  none.close();
   for (const auto &body : scene.bodies)
-    form->assemble(*body, level, state, {}, 0., none, residual, &matrix);
+    form->assemble(*body, level, state, {}, 0., boundary.unused(), residual, &matrix, gross);
   residual.compress(dealii::VectorOperation::add);
-  matrix.compress(dealii::VectorOperation::unknown);
   residual.block(0) = 0.;
+  fill_empty_diagonal(level);
   linear_solver.prepare(matrix);
   matrix_is_valid = false;
   correction = 0.;

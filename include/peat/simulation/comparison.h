@@ -88,10 +88,12 @@ private:
                   double time) const;
   Norms compare_cells(const Reference &reference, const Curve *curve, double time,
                       const Scene<dim> &scene) const;
-  Norms compare_points(const Reference &reference, double time, const Scene<dim> &scene) const;
+  Norms compare_points(const Reference &reference, const Curve *curve, double time,
+                       const Scene<dim> &scene) const;
   std::vector<Norms> norms(const Reference &reference) const;
   Result result(const Reference &reference) const;
 
+  const bool finite_elements;
   std::vector<Reference> references;
   std::vector<double> all_times;
   double time_tolerance;

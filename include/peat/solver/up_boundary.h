@@ -22,10 +22,12 @@ public:
   UpBoundary(const Space<dim> &space, const Scene<dim> &scene, double penalty);
 
   /// Find prescribed unknowns and the carriers of surface pieces; the surfaces are settled and located.
-  /// `unused` are unknowns of this rank that nothing holds. Collective.
-  void locate(const ActiveNodes<dim> &active, const std::vector<typename Space<dim>::Index> &unused);
+  /// `unused_unknowns` are those of this rank that nothing holds. Collective.
+  void locate(const ActiveNodes<dim> &active, const std::vector<typename Space<dim>::Index> &unused_unknowns);
 
   const dealii::AffineConstraints<double> &constraints() const { return homogeneous; }
+  /// Only the unknowns that nothing holds.
+  const dealii::AffineConstraints<double> &unused() const { return unused_only; }
   bool prescribes_pressure() const { return any_pressure; }
 
   /// Set the prescribed displacements since `start` and pressures at `end` in a vector of this rank's unknowns.
@@ -94,7 +96,7 @@ private:
   const Grid<dim> &grid;
   const Scene<dim> &scene;
   const double penalty;
-  dealii::AffineConstraints<double> homogeneous;
+  dealii::AffineConstraints<double> homogeneous, unused_only;
   std::vector<Motion> motions;
   std::vector<GivenPressure> pressures;
   std::vector<Piece> pieces;

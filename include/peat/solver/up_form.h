@@ -51,6 +51,10 @@ struct StepWork
   bool finite = true;
 };
 
+/// What the residual's terms would sum up to if none cancelled another: the scale of round-off. By block, of
+/// one rank.
+using GrossResidual = std::array<double, 2>;
+
 /// Sources other than surfaces: gravity, body forces and fluid sources.
 template <int dim>
 struct VolumeLoads
@@ -80,7 +84,7 @@ public:
   virtual void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
                         const VolumeLoads<dim> &loads, double stabilisation,
                         const dealii::AffineConstraints<double> &constraints, BlockVector &residual,
-                        BlockMatrix *matrix) = 0;
+                        BlockMatrix *matrix, GrossResidual &gross) = 0;
 
   /// Take the step: stress, state, pressure, displacement and velocity of the points from the unknowns and the
   /// velocity at its end (in `end_velocity`); with `move`, also positions, volumes and extents.

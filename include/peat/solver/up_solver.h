@@ -86,6 +86,8 @@ private:
   double residual_norm(unsigned int block) const;
   bool converged() const;
   void line_search(const TimeLevel &level, double before);
+  /// What is prescribed, or held by nothing, stands for itself.
+  void fill_empty_diagonal(const TimeLevel &level);
   void share_unknown();
   /// After the unknowns have been found: points, tracers, balances.
   void accept(const TimeLevel &level);
@@ -125,6 +127,7 @@ private:
   double pressure_scale = 0., displacement_scale = 0.;
   std::array<double, 2> residual_scale{}; ///< largest residuals so far: momentum [N], fluid [m^dim/s]
   double fluid_scale_before = 1.;
+  GrossResidual gross{};
   NodalFields<dim> nodal;
   Ledger<dim> book;
   Work done;
