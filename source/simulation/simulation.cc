@@ -69,8 +69,8 @@ struct Simulation<dim>::Outputs
       pictures = std::make_unique<Pictures<dim>>(directory, scene, grid.communicator());
   }
 
-  void plan(const OutputParameters &output, const Comparison<dim> &comparison, const double start,
-            const double end)
+  void plan(const OutputParameters &output, const Comparison<dim> &comparison, const Recorder<dim> *recorder,
+            const double start, const double end)
   {
     const double statistics_interval =
         output.statistics_interval > 0. ? output.statistics_interval : (end - start) / 200.;
@@ -79,12 +79,13 @@ struct Simulation<dim>::Outputs
         Schedule::every(output.probe_interval > 0. ? output.probe_interval : statistics_interval, start, end);
     picture_times = Schedule::every(output.interval, start, end);
     comparison_times = Schedule::at(comparison.times(), start, end);
+    recording_times = Schedule::at(recorder ? recorder->times() : std::vector<double>(), start, end);
   }
 
   /// When something is next due.
   double next() const
   {
-    double time = std::min(statistics_times.next(), comparison_times.next());
+    double time = std::min({statistics_times.next(), comparison_times.next(), recording_times.next()});
     if (probes)
       time = std::min(time, probe_times.next());
     if (pictures)
@@ -95,15 +96,15 @@ struct Simulation<dim>::Outputs
   Statistics<dim> statistics;
   std::unique_ptr<ProbeWriter<dim>> probes;
   std::unique_ptr<Pictures<dim>> pictures;
-  Schedule statistics_times, probe_times, picture_times, comparison_times;
+  Schedule statistics_times, probe_times, picture_times, comparison_times, recording_times;
 };
 
 template <int dim>
 Simulation<dim>::Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options,
-                            MPI_Comm communicator)
+                            MPI_Comm communicator, Recorder<dim> *recorder)
     : begin(seconds()), parameters(parameters), options(options), communicator(communicator),
       grid(parameters.grid, communicator), scene(make_scene(parameters, grid)),
-      comparison(parameters, std::filesystem::path(options.file).parent_path().string()),
+      comparison(parameters, std::filesystem::path(options.file).parent_path().string()), recorder(recorder),
       directory(prepare_directory(options, communicator)),
       log(directory, dealii::Utilities::MPI::this_mpi_process(communicator) == 0, options.quiet),
       stage_scheme(parameters.scheme)
@@ -160,7 +161,7 @@ void Simulation<dim>::run_stage(const StageParameters &stage, const double start
   const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
   solver = std::make_unique<ExplicitMPM<dim>>(stage_scheme, grid, scene, start, carried);
   solver->prepare();
-  outputs->plan(parameters.output, comparison, start, end);
+  outputs->plan(parameters.output, comparison, recorder, start, end);
   std::ostringstream message;
   message << "stage '" << stage.name << "': " << stage.duration << " s, stable step "
           << solver->stable_step().dt << " s (" << solver->stable_step().limit << ')';
@@ -224,6 +225,8 @@ void Simulation<dim>::report(const double time, const bool everything)
   }
   if (outputs->comparison_times.due(time))
     comparison.compare(time, scene, communicator);
+  if (outputs->recording_times.due(time))
+    recorder->record(time, scene, grid);
   if (outputs->probes && (outputs->probe_times.due(time) || everything) &&
       !(steps.n_steps > 0 && outputs->probes->time() == time)) {
     outputs->probes->write(time);
