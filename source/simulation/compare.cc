@@ -68,6 +68,7 @@ std::array<ComparedRun, 2> name_runs(const CompareParameters &compare, const std
 }
 
 /// The file with what a run sets. Throws an InputError at the entry of `Compare` if that is refused.
+template <int dim>
 ParameterFile file_of(const RunOptions &options, const CompareParameters &compare, const ComparedRun &run,
                       const bool is_first)
 {
@@ -75,7 +76,10 @@ ParameterFile file_of(const RunOptions &options, const CompareParameters &compar
   for (const std::string &setting : split_settings(run.settings))
     overrides.push_back(setting);
   try {
-    return ParameterFile(options.file, overrides);
+    ParameterFile file(options.file, overrides);
+    if (read_dimension(file) != dim)
+      throw InputError("the runs must have the same 'Dimension'");
+    return file;
   } catch (const InputError &error) {
     compare.section.fail(is_first ? "First" : "Second", error.what());
   }
@@ -139,7 +143,7 @@ template <int dim>
 bool run_one(const RunOptions &options, const CompareParameters &compare, ComparedRun &run,
              const bool is_first, std::vector<Difference> &against_references, MPI_Comm communicator)
 {
-  const ParameterFile file = file_of(options, compare, run, is_first);
+  const ParameterFile file = file_of<dim>(options, compare, run, is_first);
   Case<dim> parameters(file);
   RunOptions own = options;
   own.output = run.directory;
@@ -283,8 +287,8 @@ int compare(const ParameterFile &file, const RunOptions &options, MPI_Comm commu
   data.directory = options.output.empty() ? default_output_directory(options.file) : options.output;
   data.runs = name_runs(parameters.compare, data.directory);
   for (unsigned int r = 0; r < 2; ++r)
-    check_run<dim>(file_of(options, parameters.compare, data.runs[r], r == 0), options, parameters.compare,
-                   r == 0, communicator);
+    check_run<dim>(file_of<dim>(options, parameters.compare, data.runs[r], r == 0), options,
+                   parameters.compare, r == 0, communicator);
   for (unsigned int r = 0; r < 2; ++r) {
     ComparedRun &run = data.runs[r];
     forget_peak_memory();
