@@ -83,6 +83,8 @@ class Data:
         self.time, self.body = columns["time [s]"], columns["body"]
         self.cell = np.array([columns["cell " + axis].astype(int) for axis in "ijk"[:self.dimension]])
         self.times = np.unique(self.time)
+        # As samples.csv has rounded it.
+        self.view["time"] = self.times[np.argmin(np.abs(self.times - self.view["time"]))]
         self.fields, self.units = [], {}
         self.samples = []
         for run in self.runs:

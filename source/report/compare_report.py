@@ -23,12 +23,12 @@ p, li { max-width: 75ch; }
 .verdict { padding: .7rem 1rem; border-left: 4px solid #2e8b57; background: #eef7f1; margin: 1rem 0; }
 .verdict.attention { border-color: #d98200; background: #fdf5e6; }
 .scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; margin: .4rem 0; }
+table { border-collapse: collapse; font-size: 13.5px; font-variant-numeric: tabular-nums; margin: .4rem 0; }
 th, td { padding: .26rem .8rem .26rem 0; text-align: right; border-bottom: 1px solid #e9edf1; white-space: nowrap; }
 th { font-weight: 600; color: #46515f; border-bottom: 1.5px solid #aab4c0; }
 td:first-child, th:first-child, td.text, th.text { text-align: left; }
 tr.group td { font-weight: 600; padding-top: .8rem; border-bottom: 1px solid #aab4c0; }
-.pass { color: #23744a; } .attention { color: #a85f00; font-weight: 600; }
+.pass { color: #23744a; } span.attention { color: #a85f00; font-weight: 600; }
 td .mark { display: inline-block; width: 1.1em; text-align: center; }
 img { max-width: 100%; height: auto; display: block; margin: .3rem 0 .9rem; }
 pre { background: #f5f7f9; padding: .8rem; overflow-x: auto; font-size: 12.5px; line-height: 1.4; }
@@ -180,7 +180,7 @@ def findings(data):
     sentences = data.summary["findings"]
     if not sentences:
         return "<p>No difference is above the tolerance anywhere.</p>"
-    items = ["<li>%s</li>" % text(sentence) for sentence in sentences]
+    items = ["<li>%s</li>" % text(sentence).replace(" %", "&nbsp;%").replace("= ", "=&nbsp;") for sentence in sentences]
     most = 8
     shown = "<ul>%s</ul>" % "\n".join(items[:most])
     if len(items) > most:

@@ -19,6 +19,8 @@
 
 namespace peat {
 namespace {
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
 /// What the two runs of a case set, split at ';'.
 std::vector<std::string> split_settings(const std::string &text)
 {
@@ -125,9 +127,10 @@ void add_reference_differences(const Case<dim> &parameters, const Comparison<dim
     d.L2 = result.norms.L2;
     d.Linf = result.norms.Linf;
     d.scale_L2 = d.scale_Linf = result.scale;
-    d.relative_L2 = result.relative_L2;
-    d.relative_Linf = result.relative_Linf;
-    d.share_above = std::numeric_limits<double>::quiet_NaN();
+    // A reference that is zero and has no scale of its own gives no relative differences.
+    d.relative_L2 = result.scale > 0. ? result.relative_L2 : nan;
+    d.relative_Linf = result.scale > 0. ? result.relative_Linf : nan;
+    d.share_above = nan;
     d.n = result.norms.n;
     d.n_left_out = result.norms.n_outside;
     d.time = result.norms.worst_time;

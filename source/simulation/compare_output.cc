@@ -182,8 +182,9 @@ void write_differences(const ComparisonData &data)
       row.push_back(csv_number(x));
     row.push_back(std::to_string(d.n));
     row.push_back(std::to_string(d.n_left_out));
-    row.push_back(d.negligible ? "negligible"
-                               : (d.n == 0 ? "" : (is_above(d, data.tolerance) ? "yes" : "no")));
+    row.push_back(d.negligible
+                      ? "negligible"
+                      : (std::isnan(d.relative_L2) ? "" : (is_above(d, data.tolerance) ? "yes" : "no")));
     row.push_back(d.n > 0 ? csv_number(d.time) : "");
     for (unsigned int k = 0; k < 3; ++k)
       row.push_back(has_place && k < data.dimension ? csv_number(d.place[k]) : "");

@@ -1,5 +1,6 @@
 #include <peat/simulation/difference.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -65,9 +66,8 @@ std::string when(const double time, const double end_time)
 }
 } // namespace
 
-std::string readable_value(const double value, const std::string &unit)
+std::string readable_value(const double value, const std::string &unit, const double size)
 {
-  const double size = std::abs(value);
   struct Prefix
   {
     const char *base;
@@ -97,10 +97,11 @@ std::string sentence(const Difference &difference, const std::array<std::string,
   else
     text += (reference ? labels[1] + " is within the tolerance over all (" : "the runs agree over all (") +
             percent(difference.relative_L2) + ") but not everywhere";
+  const double size = std::max(std::abs(difference.value[0]), std::abs(difference.value[1]));
   text += "; the difference is largest, " + percent(difference.relative_Linf) + ", " +
           when(difference.time, end_time) + where(difference, dimension) + ": " + labels[1] + " " +
-          readable_value(difference.value[1], difference.unit) + ", " + labels[0] + " " +
-          readable_value(difference.value[0], difference.unit);
+          readable_value(difference.value[1], difference.unit, size) + ", " + labels[0] + " " +
+          readable_value(difference.value[0], difference.unit, size);
   if (!std::isnan(difference.share_above))
     text +=
         "; " + percent(difference.share_above) + " of the values differ by more than " + percent(tolerance);

@@ -71,6 +71,6 @@ void mark_negligible(std::vector<Difference> &differences, double mesh_size, dou
 std::string sentence(const Difference &difference, const std::array<std::string, 2> &labels, double tolerance,
                      unsigned int dimension, double end_time);
 
-/// A number with its unit for people: "12.3 kPa", "-0.45 mm", "3.2e-07 m/s".
-std::string readable_value(double value, const std::string &unit);
+/// A number with its unit for people, in the prefix that suits a number of that size: "12.3 kPa", "-0.45 mm".
+std::string readable_value(double value, const std::string &unit, double size);
 } // namespace peat
