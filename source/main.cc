@@ -15,7 +15,7 @@ const char *const usage =
     R"(PEAT: Poromechanics with Elements And maTerial points
 
   peat run CASE.prm           run a case (also: peat CASE.prm; mpirun -np N peat run CASE.prm)
-  peat compare CASE.prm       run it with both methods (CMPM and u-p FEM) and report where they differ
+  peat compare CASE.prm       run it with two methods or settings and report where the results differ
   peat check CASE.prm         validate a case and say what it would take; runs nothing
   peat parameters             every parameter with meaning, unit, default and range
 )";

@@ -190,8 +190,9 @@ def maps(data, field, time):
     figure, axes = plt.subplots(1, 3, figsize=(3 * width, min(5.0, max(1.9, width * aspect * 0.85 + 1.1))), sharey=True)
     low, high = (f([np.nanmin(v) for v in values] if f is min else [np.nanmax(v) for v in values]) for f in (min, max))
     largest = np.nanmax(np.abs(difference)) if np.isfinite(difference).any() else 0.0
-    pictures = [(axes[0], factor * values[0], data.labels[0], dict(cmap="viridis", vmin=factor * low, vmax=factor * high), unit),
-                (axes[1], factor * values[1], data.labels[1], dict(cmap="viridis", vmin=factor * low, vmax=factor * high), unit),
+    same_colors = dict(cmap="viridis", vmin=factor * low, vmax=factor * high)
+    pictures = [(axes[0], factor * values[0], data.labels[0], same_colors, unit),
+                (axes[1], factor * values[1], data.labels[1], same_colors, unit),
                 (axes[2], small * difference, "%s − %s" % (data.labels[1], data.labels[0]),
                  dict(cmap="RdBu_r", vmin=-small * largest or -1, vmax=small * largest or 1), small_unit)]
     for axis, array, title, colors, name in pictures:

@@ -133,7 +133,8 @@ def differences(data):
     for body in [""] + data.summary["bodies"]:
         chosen = [r for r in data.differences if r["runs"] == pair and r["kind"] == "cells" and r["name"] == body]
         if chosen:
-            rows.append("All bodies" if not body and len(data.summary["bodies"]) > 1 else "Body '%s'" % text(body or data.summary["bodies"][0]))
+            several = not body and len(data.summary["bodies"]) > 1
+            rows.append("All bodies" if several else "Body '%s'" % text(body or data.summary["bodies"][0]))
             rows += difference_rows(data, chosen, lambda r: r["field"])
     parts = ["<h3>%s against %s, means over cells</h3>" % (second, first), table(head(first, second), rows, {4, 7})]
 
@@ -206,12 +207,14 @@ def figures(data):
     if picture:
         sections.append(("The field when it is largest", "<p>%s at t = %.4g s%s.</p>%s" % (
             text(view["field"].capitalize()), view["time"], where, plots.image(picture, view["field"]))))
-    images = [plots.image(f, field) for field in plots.chosen_history_fields(data) for f in [plots.histories(data, field)] if f]
+    images = [plots.image(f, field) for field in plots.chosen_history_fields(data)
+              for f in [plots.histories(data, field)] if f]
     if images:
         sections.append(("Histories at the probes", "".join(images)))
     fields = [view["field"], "displacement " + axis]
     fields += sorted({row["field"] for row in data.references if row["kind"] != "history"} & set(data.fields) - set(fields))
-    images = [plots.image(f, field) for line in view["lines"] for field in fields for f in [plots.profiles(data, field, line)] if f]
+    images = [plots.image(f, field) for line in view["lines"] for field in fields
+              for f in [plots.profiles(data, field, line)] if f]
     if images:
         sections.append(("Profiles along vertical lines", "".join(images)))
     picture = plots.energies(data)

@@ -165,7 +165,7 @@ bool run_one(const RunOptions &options, const CompareParameters &compare, Compar
   return true;
 }
 
-void add_run_differences(ComparisonData &data)
+void add_run_differences(ComparisonData &data, const double stiffness)
 {
   auto &runs = data.runs;
   std::vector<Difference> list = compare_cells(runs[0].recording, runs[1].recording, data.tolerance);
@@ -176,7 +176,7 @@ void add_run_differences(ComparisonData &data)
   for (const auto &planes : runs[0].recording.planes)
     if (!planes.empty())
       mesh_size = std::max(mesh_size, planes.back() - planes.front());
-  mark_negligible(list, mesh_size, data.end_time);
+  mark_negligible(list, mesh_size, data.end_time, stiffness);
   for (Difference &difference : list)
     difference.runs = runs[1].name + '-' + runs[0].name;
   data.differences.insert(data.differences.begin(), list.begin(), list.end());
@@ -270,7 +270,10 @@ void evaluate(const Case<dim> &parameters, const RunOptions &options, Comparison
   data.tolerance = parameters.compare.tolerance;
   data.end_time = parameters.end_time();
   data.dimension = dim;
-  add_run_differences(data);
+  double stiffness = 0.;
+  for (const auto &material : parameters.materials)
+    stiffness = std::max(stiffness, material->initial_modulus());
+  add_run_differences(data, stiffness);
   const Sights sights = find_sights(parameters, data.runs[0].recording);
   write_differences(data);
   const bool complete = write_samples(data, sights);

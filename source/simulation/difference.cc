@@ -323,21 +323,25 @@ std::vector<Difference> compare_histories(const Histories &first, const Historie
   return list;
 }
 
-void mark_negligible(std::vector<Difference> &differences, const double mesh_size, const double end_time)
+void mark_negligible(std::vector<Difference> &differences, const double mesh_size, const double end_time,
+                     const double stiffness)
 {
   // Far above round-off, far below anything that can be measured.
-  constexpr double least = 1e-10;
-  double largest_stress = 0.;
+  constexpr double least = 1e-10, least_strain = 1e-12;
+  double least_stress = least_strain * stiffness;
   for (const Difference &difference : differences)
     if (difference.unit == "Pa" && difference.n > 0)
-      largest_stress = std::max(largest_stress, difference.scale_Linf);
+      least_stress = std::max(least_stress, least * difference.scale_Linf);
   for (Difference &difference : differences) {
     const std::string quantity = quantity_of(difference.field);
-    const double scale = quantity == "displacement"
-                             ? mesh_size
-                             : (quantity == "velocity" ? mesh_size / end_time
-                                                       : (difference.unit == "Pa" ? largest_stress : 0.));
-    difference.negligible = difference.n > 0 && difference.scale_Linf <= least * scale;
+    double bound = 0.;
+    if (quantity == "displacement")
+      bound = least * mesh_size;
+    else if (quantity == "velocity")
+      bound = least * mesh_size / end_time;
+    else if (difference.unit == "Pa")
+      bound = least_stress;
+    difference.negligible = difference.n > 0 && difference.scale_Linf <= bound;
     if (difference.negligible)
       difference.relative_L2 = difference.relative_Linf = nan;
   }

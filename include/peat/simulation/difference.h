@@ -63,8 +63,9 @@ Histories read_histories(const std::string &file_name);
 std::vector<Difference> compare_histories(const Histories &first, const Histories &second, double tolerance);
 
 /// Marks quantities that are round-off: relative to the mesh and the run for displacement and velocity,
-/// relative to each other for pressure and stress.
-void mark_negligible(std::vector<Difference> &differences, double mesh_size, double end_time);
+/// relative to each other and to the largest stiffness of a skeleton for pressure and stress. [m], [s], [Pa].
+void mark_negligible(std::vector<Difference> &differences, double mesh_size, double end_time,
+                     double stiffness);
 
 /// One sentence about a difference above the tolerance: how large, where and when it is largest, both values.
 /// `labels` are what the runs are called, in the order of Difference::value.
