@@ -15,6 +15,7 @@ const char *const usage =
     R"(PEAT: Poromechanics with Elements And maTerial points
 
   peat run CASE.prm           run a case (also: peat CASE.prm; mpirun -np N peat run CASE.prm)
+  peat compare CASE.prm       run it with two methods or settings and report where the results differ
   peat check CASE.prm         validate a case and say what it would take; runs nothing
   peat parameters             every parameter with meaning, unit, default and range
 )";
@@ -66,7 +67,7 @@ bool parse(const int argc, char **argv, const bool first_rank, CommandLine &line
   if (values.count("output") && line.run.output.empty())
     throw InputError("'--output' needs the name of a directory");
   const std::string &first = words.front();
-  const bool is_command = first == "run" || first == "check" || first == "parameters";
+  const bool is_command = first == "run" || first == "compare" || first == "check" || first == "parameters";
   line.command = is_command ? first : "run";
   if (!is_command && (first.size() < 4 || first.substr(first.size() - 4) != ".prm"))
     throw InputError("'" + first + "' is no command and no parameter file (.prm); see peat --help");
@@ -104,6 +105,8 @@ int main(int argc, char **argv)
       return exit_success;
     if (line.command == "parameters")
       return first_rank ? command_parameters(line.format, line.dimension) : exit_success;
+    if (line.command == "compare")
+      return command_compare(line.run, communicator);
     return line.command == "check" ? command_check(line.run, communicator)
                                    : command_run(line.run, communicator);
   } catch (const InputError &error) {

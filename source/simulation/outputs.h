@@ -27,8 +27,8 @@ struct Simulation<dim>::Outputs
       pictures = std::make_unique<Pictures<dim>>(directory, scene, grid.communicator());
   }
 
-  void plan(const OutputParameters &output, const Comparison<dim> &comparison, const double start,
-            const double end, const bool long_steps)
+  void plan(const OutputParameters &output, const Comparison<dim> &comparison, const Recorder<dim> *recorder,
+            const double start, const double end, const bool long_steps)
   {
     every_step = long_steps && output.statistics_interval == 0. && output.probe_interval == 0.;
     const double statistics_interval =
@@ -40,12 +40,13 @@ struct Simulation<dim>::Outputs
       statistics_times = probe_times = Schedule::at({}, start, end);
     picture_times = Schedule::every(output.interval, start, end);
     comparison_times = Schedule::at(comparison.times(), start, end);
+    recording_times = Schedule::at(recorder ? recorder->times() : std::vector<double>(), start, end);
   }
 
   /// When something is next due.
   double next() const
   {
-    double time = std::min(statistics_times.next(), comparison_times.next());
+    double time = std::min({statistics_times.next(), comparison_times.next(), recording_times.next()});
     if (probes)
       time = std::min(time, probe_times.next());
     if (pictures)
@@ -57,6 +58,6 @@ struct Simulation<dim>::Outputs
   std::unique_ptr<ProbeWriter<dim>> probes;
   std::unique_ptr<Pictures<dim>> pictures;
   bool every_step = false; ///< statistics and probes are written after each step
-  Schedule statistics_times, probe_times, picture_times, comparison_times;
+  Schedule statistics_times, probe_times, picture_times, comparison_times, recording_times;
 };
 } // namespace peat

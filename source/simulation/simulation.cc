@@ -52,10 +52,10 @@ void StepRecord::add(const double dt)
 
 template <int dim>
 Simulation<dim>::Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options,
-                            MPI_Comm communicator)
+                            MPI_Comm communicator, Recorder<dim> *recorder)
     : begin(seconds()), parameters(parameters), options(options), communicator(communicator),
       grid(parameters.grid, communicator), scene(make_scene(parameters, grid)),
-      comparison(parameters, std::filesystem::path(options.file).parent_path().string()),
+      comparison(parameters, std::filesystem::path(options.file).parent_path().string()), recorder(recorder),
       directory(prepare_directory(options, communicator)),
       log(directory, dealii::Utilities::MPI::this_mpi_process(communicator) == 0, options.quiet),
       stage_scheme(parameters.scheme)
@@ -115,6 +115,8 @@ void Simulation<dim>::report(const double time, const bool everything)
   }
   if (outputs->comparison_times.due(time))
     comparison.compare(time, scene, communicator);
+  if (outputs->recording_times.due(time))
+    recorder->record(time, scene, grid);
   if (outputs->probes && (outputs->probe_times.due(time) || outputs->every_step || everything) &&
       !(steps.n_steps > 0 && outputs->probes->time() == time)) {
     outputs->probes->write(time);

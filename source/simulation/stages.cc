@@ -9,7 +9,7 @@ template <int dim>
 void Simulation<dim>::run_stage(const StageParameters &stage, const double start)
 {
   const bool implicit = parameters.method == Method::fem || stage.solver != StageParameters::Solver::dynamic;
-  outputs->plan(parameters.output, comparison, start, start + stage.duration,
+  outputs->plan(parameters.output, comparison, recorder, start, start + stage.duration,
                 stage.solver == StageParameters::Solver::quasi_static);
   if (stage.solver == StageParameters::Solver::static_state)
     run_static_stage(stage, start);

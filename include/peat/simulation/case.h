@@ -5,6 +5,7 @@
 #include <peat/material/material.h>
 #include <peat/points/body.h>
 #include <peat/simulation/output_parameters.h>
+#include <peat/simulation/recorder.h>
 #include <peat/simulation/reference.h>
 #include <peat/solver/implicit_parameters.h>
 #include <peat/solver/linear_solver.h>
@@ -65,6 +66,7 @@ struct Case
   std::vector<ProbeParameters<dim>> probes;
   std::vector<ReferenceParameters<dim>> references;
   OutputParameters output;
+  CompareParameters compare;
 
 private:
   void check(const Section &root) const;

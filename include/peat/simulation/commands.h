@@ -13,6 +13,11 @@ enum ExitCode { exit_success = 0, exit_input_error = 1, exit_numerical_error = 2
 /// `peat run`: run the case and leave an output directory.
 int command_run(const RunOptions &options, MPI_Comm communicator);
 
+/// `peat compare`: two runs of the case with two methods or settings, and how far they are from each other
+/// and from the references; leaves the directories of both, compare.csv, samples.csv, summary.json and
+/// report.html.
+int command_compare(const RunOptions &options, MPI_Comm communicator);
+
 /// `peat check`: validate, and say what a run would take; runs nothing.
 int command_check(const RunOptions &options, MPI_Comm communicator);
 

@@ -5,6 +5,7 @@
 #include <peat/simulation/log.h>
 #include <peat/simulation/pictures.h>
 #include <peat/simulation/probes.h>
+#include <peat/simulation/recorder.h>
 #include <peat/simulation/run_options.h>
 #include <peat/simulation/schedule.h>
 #include <peat/simulation/statistics.h>
@@ -45,12 +46,16 @@ template <int dim>
 class Simulation
 {
 public:
+  /// `recorder`, if any, is called at its times and must live as long as this.
   Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options,
-             MPI_Comm communicator);
+             MPI_Comm communicator, Recorder<dim> *recorder = nullptr);
   ~Simulation();
 
   /// Returns false if a signal ended the run early. Throws NumericalError after writing the last state.
   bool run();
+
+  /// What was found against the references of the case.
+  const Comparison<dim> &references() const { return comparison; }
 
 private:
   struct Outputs;
@@ -75,6 +80,7 @@ private:
   Grid<dim> grid;
   Scene<dim> scene;
   Comparison<dim> comparison;
+  Recorder<dim> *const recorder;
   const std::string directory;
   Log log;
   std::unique_ptr<Solver<dim>> solver;
