@@ -135,6 +135,63 @@ private:
 };
 const ConditionMember<Pressure> pressure("pressure", "a given pore pressure; fluid may pass.");
 
+/// Free water: what stands above a surface presses on it and fixes the pore pressure there.
+template <int dim>
+class WaterTable : public Condition<dim>
+{
+public:
+  WaterTable(Section section, const Place<dim> &place) : Condition<dim>(section, place), level("0", {}, {})
+  {
+    section.add("Level", level, 1, "m", "Height of the water table (the last coordinate), above or below the surface.");
+    section.add("Unit weight", unit_weight, positive("N/m^3"), "Of the water: rho_f g.");
+    section.add("Suction", suction,
+                "Pressures above the water table are negative as if the water stood there at rest; otherwise zero.");
+    section.require("Level", "condition '" + section.name() + "'");
+    section.require_start("Level", level);
+    if (place.on_mesh() && !section.describing())
+      section.fail("Where", "a water table acts on the surface of a body: 'surface of BODY' or 'top of BODY'");
+  }
+  bool concerns_fluid() const override { return true; }
+  typename Condition<dim>::Fluid fluid() const override { return Condition<dim>::Fluid::pressure; }
+  double fluid_value(const double *x, const double t) const override
+  {
+    const double p = unit_weight * (level.value(x, t) - x[dim - 1]);
+    return suction ? p : std::max(0., p);
+  }
+  dealii::Tensor<1, dim> force(const SurfacePoint<dim> &point, const double t) const override
+  {
+    double x[3];
+    coordinates(point.position, x);
+    return this->place.contains(point) ? -std::max(0., fluid_value(x, t)) * point.area : dealii::Tensor<1, dim>();
+  }
+
+  void add_loads(const ActiveNodes<dim> &, const Surface<dim> &surface,
+                 NodalFields<dim> &fields) const override
+  {
+    double x[3];
+    for (const SurfacePoint<dim> &point : surface) {
+      if (!this->place.contains(point))
+        continue;
+      coordinates(point.position, x);
+      const double p = fluid_value(x, fields.time);
+      const auto weight = force(point, fields.time);
+      for (unsigned int i = 0; i < point.n_nodes; ++i)
+        for (unsigned int d = 0; d < dim; ++d) {
+          const std::size_t row = std::size_t(point.node[i]) * dim + d;
+          fields.pressure_load[row] -= p * point.area[d] * point.N[i];
+          fields.force[row] += weight[d] * point.N[i];
+        }
+    }
+  }
+
+private:
+  Function level;
+  double unit_weight = 9810.;
+  bool suction = true;
+};
+const ConditionMember<WaterTable> water_table(
+    "water table", "water at rest up to a level: its pressure on a body's surface, as a load and in the pores.");
+
 template <int dim>
 class Flux : public Condition<dim>
 {

@@ -17,6 +17,17 @@ StageParameters::StageParameters(Section section) : name(section.name())
            : solver_name == "quasi-static" ? Solver::quasi_static
                                            : Solver::dynamic;
   section.add("Duration", duration, nonnegative("s"), "How long the stage lasts; a static one takes no time.");
+  std::string state_name = "points";
+  section.add("Static state", state_name, {"points", "fem"},
+              "Of a static stage with material points. 'points': on the points' own quadrature, so that an "
+              "explicit stage which follows stays at rest to round-off. 'fem': on the finite element mesh, from "
+              "which the points take their stresses and pressures.");
+  static_on_points = state_name == "points";
+  section.add("K0", K0, nonnegative(""),
+              "Static: horizontal over vertical effective stress, where not given by elasticity (0). The vertical "
+              "direction is the last one; what is then out of balance is balanced elastically.");
+  if (K0 > 0. && solver != Solver::static_state)
+    section.fail("K0", "belongs to static stages");
   section.add("Reset displacements", reset_displacements,
               "Count displacements from the end of this stage; stresses, pressures and history stay.");
   section.add(
@@ -211,6 +222,19 @@ void Case<dim>::check(const Section &root) const
       root.subsection("Materials").subsection(body.material).fail("", message.str());
     }
   }
+  for (const auto &stage : stages)
+    for (const auto &body : bodies)
+      if (stage.K0 > 0. && !keeps_stress(material(body.material).law()))
+        root.subsection("Stages").subsection(stage.name).fail(
+            "K0", "with the law of material '" + body.material +
+                      "' stress follows from strain alone; use 'linear elastic' or 'jaumann'");
+  for (const auto &condition : conditions)
+    if (condition->has_fluid_source() && method == Method::mpm &&
+        std::any_of(stages.begin(), stages.end(), [](const auto &stage) {
+          return stage.solver == StageParameters::Solver::dynamic;
+        }))
+      condition->section.fail("Kind", "the explicit step of material points knows no fluid sources; use 'Method "
+                                      "= fem', or quasi-static stages");
   for (const auto &condition : conditions)
     if (condition->concerns_fluid() && !is_saturated())
       condition->section.fail("Kind", "condition '" + condition->name +
@@ -241,12 +265,23 @@ bool Case<dim>::is_implicit() const
 template <int dim>
 SchemeFields Case<dim>::fields() const
 {
-  SchemeFields fields = scheme.fields();
-  if (method == Method::fem) {
-    fields.extent = false;
-    fields.gauss_points = static_cast<unsigned int>(implicit.element);
-  }
+  return method == Method::fem ? gauss_fields() : scheme.fields();
+}
+
+template <int dim>
+SchemeFields Case<dim>::gauss_fields() const
+{
+  SchemeFields fields;
+  fields.gauss_points = static_cast<unsigned int>(implicit.element);
   return fields;
+}
+
+template <int dim>
+Nodes Case<dim>::displacement_nodes() const
+{
+  if (method == Method::fem)
+    return implicit.element;
+  return scheme.basis == Basis::gimp ? Nodes::gimp : Nodes::q1;
 }
 
 template <int dim>

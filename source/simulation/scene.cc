@@ -64,6 +64,22 @@ Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid)
   return scene;
 }
 
+template <int dim>
+Scene<dim> make_gauss_scene(const Case<dim> &parameters, const Grid<dim> &grid)
+{
+  const SchemeFields fields = parameters.gauss_fields();
+  Scene<dim> scene;
+  for (const auto &body : parameters.bodies) {
+    scene.bodies.push_back(
+        std::make_unique<Body<dim>>(body, parameters.material(body.material), grid, fields));
+    scene.surfaces.emplace(body.name, grid)
+        .first->second.cover(*body.shape, body.points_per_direction, fields.gauss_points);
+  }
+  return scene;
+}
+
+template Scene<2> make_gauss_scene<2>(const Case<2> &, const Grid<2> &);
+template Scene<3> make_gauss_scene<3>(const Case<3> &, const Grid<3> &);
 template Scene<2> make_scene<2>(Case<2> &, const Grid<2> &);
 template Scene<3> make_scene<3>(Case<3> &, const Grid<3> &);
 } // namespace peat

@@ -1,4 +1,5 @@
 #include <peat/simulation/simulation.h>
+#include <peat/solver/rest_pressure.h>
 
 #include <sstream>
 
@@ -39,34 +40,72 @@ unsigned long Simulation<dim>::unknowns_of_solver() const
 }
 
 template <int dim>
-void Simulation<dim>::make_up_solver(const double start)
+void Simulation<dim>::make_up_solver(const typename UpSolver<dim>::Method method, const double start)
 {
-  const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
   // Finite elements keep their nodal values from stage to stage.
-  if (up_solver && parameters.method == Method::fem)
+  if (up_solver && method == UpSolver<dim>::Method::finite_elements)
     return;
-  const bool fem = parameters.method == Method::fem;
-  const Nodes nodes = fem                                      ? parameters.implicit.element
-                      : parameters.scheme.basis == Basis::gimp ? Nodes::gimp
-                                                               : Nodes::q1;
+  const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
   auto made = std::make_unique<UpSolver<dim>>(
-      parameters.implicit, parameters.linear,
-      fem ? UpSolver<dim>::Method::finite_elements : UpSolver<dim>::Method::material_points, nodes,
+      parameters.implicit, parameters.linear, method, parameters.displacement_nodes(),
       parameters.scheme.seepage_inertia, grid, scene, start, carried);
   made->prepare();
   up_solver = made.get();
   solver = std::move(made);
 }
 
+namespace {
+/// The state of rest under the loads; with a given ratio of stresses, the one that is nearest to it.
+template <int dim>
+void find_static_state(UpSolver<dim> &solver, const double K0)
+{
+  solver.solve_static();
+  if (K0 > 0.) {
+    solver.set_horizontal_stress(K0);
+    solver.solve_static();
+  }
+}
+} // namespace
+
 template <int dim>
 void Simulation<dim>::run_static_stage(const StageParameters &stage, const double start)
 {
+  using Method = typename UpSolver<dim>::Method;
   const double clock = seconds();
-  make_up_solver(start);
-  log.line("stage '" + stage.name + "': static, " + std::to_string(unknowns_of_solver()) + " unknowns");
-  up_solver->solve_static();
+  std::string how = "finite elements";
+  if (parameters.method == peat::Method::fem) {
+    make_up_solver(Method::finite_elements, start);
+    find_static_state(*up_solver, stage.K0);
+  } else if (stage.static_on_points) {
+    how = "on the material points";
+    make_up_solver(Method::material_points, start);
+    up_solver->solve_static();
+    if (stage.K0 > 0.)
+      up_solver->set_horizontal_stress(stage.K0);
+    balance_pressures(scene, up_solver->nodes(), start);
+    make_up_solver(Method::points_at_rest, start);
+    up_solver->solve_static();
+  } else {
+    how = "finite elements, handed to the material points";
+    Scene<dim> elements = make_gauss_scene(parameters, grid);
+    elements.gravity = scene.gravity;
+    elements.conditions.swap(scene.conditions);
+    {
+      UpSolver<dim> fem(parameters.implicit, parameters.linear, Method::finite_elements, parameters.implicit.element,
+                        parameters.scheme.seepage_inertia, grid, elements, start);
+      fem.prepare();
+      fem.lead(scene);
+      find_static_state(fem, stage.K0);
+    }
+    elements.conditions.swap(scene.conditions);
+    make_up_solver(Method::points_at_rest, start);
+  }
   if (stage.reset_displacements)
     up_solver->reset_displacements();
+  up_solver->forget_work();
+  balances = std::make_unique<Balances<dim>>(totals(scene, communicator));
+  log.line("stage '" + stage.name + "': static state, " + how + ", " + std::to_string(unknowns_of_solver()) +
+           " unknowns");
   steps.add(0.);
   wall.time_loop += seconds() - clock;
   report(now, true);
@@ -77,7 +116,9 @@ void Simulation<dim>::run_implicit_stage(const StageParameters &stage, const dou
 {
   using Mode = typename UpSolver<dim>::Mode;
   const double end = start + stage.duration;
-  make_up_solver(start);
+  make_up_solver(parameters.method == peat::Method::fem ? UpSolver<dim>::Method::finite_elements
+                                                        : UpSolver<dim>::Method::material_points,
+                 start);
   up_solver->start(stage.solver == StageParameters::Solver::quasi_static ? Mode::quasi_static : Mode::dynamic);
   begin_stage(stage, up_solver->suggested_step());
   double clock = seconds();

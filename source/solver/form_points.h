@@ -23,7 +23,7 @@ public:
   static constexpr unsigned int stress_index[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
   static constexpr unsigned int n_stress = dim == 2 ? 4 : 6;
 
-  FormPoints(const Space<dim> &space, const Body<dim> &body, const Slice &slice, const std::uint32_t begin);
+  FormPoints(const Grid<dim> &grid, const Body<dim> &body, const Slice &slice, const std::uint32_t begin);
 
   unsigned int n;
   Lanes volume, mass;
@@ -108,7 +108,7 @@ private:
 };
 
 template <int dim, unsigned int reach>
-FormPoints<dim, reach>::FormPoints(const Space<dim> &space, const Body<dim> &body, const Slice &slice,
+FormPoints<dim, reach>::FormPoints(const Grid<dim> &grid, const Body<dim> &body, const Slice &slice,
                                    const std::uint32_t begin)
     : n(std::min(n_lanes, slice.end - begin))
 {
@@ -125,7 +125,7 @@ FormPoints<dim, reach>::FormPoints(const Space<dim> &space, const Body<dim> &bod
   Weights<dim, reach> w;
   Weights<dim, 2> wp;
   for (unsigned int d = 0; d < dim; ++d) {
-    const CellInterval interval = CellInterval::of(space.grid(), slice.cell, d);
+    const CellInterval interval = CellInterval::of(grid, slice.cell, d);
     Lanes x;
     for (unsigned int l = 0; l < n_lanes; ++l)
       x[l] = body.position(handle[l])[d];

@@ -268,7 +268,7 @@ void PointForm<dim, reach>::assemble(const Body<dim> &body, const TimeLevel &lev
     local_residual = 0.;
     stacked.clear(slice.end - slice.begin);
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
-      const Points points(space, body, slice, begin);
+      const Points points(space.grid(), body, slice, begin);
       evaluate(body, points, level, values, mean, at);
       add_residual(body, points, level, at, loads, has_pressure, gross);
       if (matrix || (has_pressure && stabilisation > 0.))
@@ -306,7 +306,7 @@ void PointForm<dim, reach>::update_points(Body<dim> &body, const TimeLevel &leve
     load(slice.cell, mixture != nullptr, level, state, values);
     gather(end_velocity, space.displacements(slice.cell), n_u, 0, 0, values.end_velocity);
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
-      const Points points(space, body, slice, begin);
+      const Points points(space.grid(), body, slice, begin);
       if (values.has_pressure) {
         evaluate(body, points, level, values, 0., at);
         const Lanes porosity = points.porosity(layout, *mixture);
@@ -350,7 +350,7 @@ void PointForm<dim, reach>::sum_over_nodes(const Body<dim> &body, dealii::Trilin
   for (const Slice &slice : body.slices()) {
     local_residual = 0.;
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
-      const Points points(space, body, slice, begin);
+      const Points points(space.grid(), body, slice, begin);
       for (unsigned int d = 0; d < dim; ++d) {
         const Lanes value = points.mass * term(points, d);
         for (unsigned int i = 0; i < Points::n_nodes; ++i)
@@ -386,7 +386,7 @@ void PointForm<dim, reach>::sum_weight(const Body<dim> &body, const StepState &s
   for (const Slice &slice : body.slices()) {
     gather(state.unknown, space.displacements(slice.cell), n_u, 0, 0, U);
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
-      const Points points(space, body, slice, begin);
+      const Points points(space.grid(), body, slice, begin);
       for (unsigned int l = 0; l < points.n; ++l) {
         auto acting = loads.gravity;
         for (const Condition<dim> *condition : loads.forces)

@@ -53,7 +53,7 @@ void UpSolver<dim>::prepare()
   for (const auto &body : scene.bodies)
     for (const Slice &slice : body->slices()) {
       solid.push_back(slice.cell);
-      if (body->material().mixture())
+      if (body->material().mixture() && method != Method::points_at_rest)
         saturated.push_back(slice.cell);
     }
   sort(solid);
@@ -61,7 +61,7 @@ void UpSolver<dim>::prepare()
   unknowns.distribute(solid, saturated);
   active.rebuild(solid);
   for (auto &[name, tracers] : scene.surfaces) {
-    if (method == Method::material_points)
+    if (method != Method::finite_elements)
       tracers.settle(scene.body(name), active);
     tracers.locate(active);
   }
@@ -201,25 +201,26 @@ bool UpSolver<dim>::needs_matrix(const TimeLevel &level) const
 }
 
 template <int dim>
-double UpSolver<dim>::residual_norm(const unsigned int block) const
+double UpSolver<dim>::residual_norm(const unsigned int block, const double tolerance) const
 {
   constexpr double round_off = 1e-14;
   const double floor = round_off * dealii::Utilities::MPI::sum(gross[block], grid.communicator());
-  const double scale = std::max(residual_scale[block], floor / parameters.newton_tolerance);
+  const double scale = std::max(residual_scale[block], floor / tolerance);
   return scale > 0. ? right_side.block(block).l2_norm() / scale : 0.;
 }
 
 template <int dim>
-bool UpSolver<dim>::converged() const
+bool UpSolver<dim>::converged(const double tolerance) const
 {
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
-    if (!(residual_norm(b) <= parameters.newton_tolerance))
+    if (!(residual_norm(b, tolerance) <= tolerance))
       return false;
   return true;
 }
 
 template <int dim>
-void UpSolver<dim>::solve(const TimeLevel &level, const double start, const double end)
+void UpSolver<dim>::solve(const TimeLevel &level, const double start, const double end,
+                          const double tolerance)
 {
   boundary.prescribe(start, end, unknown);
   for (unsigned int iteration = 0;; ++iteration) {
@@ -239,13 +240,13 @@ void UpSolver<dim>::solve(const TimeLevel &level, const double start, const doub
       std::ostringstream text;
       text << "the equations of the step from t = " << start << " s to " << end << " s have "
            << (std::isfinite(right_side.l2_norm()) ? "not been solved" : "no finite solution") << " after "
-           << iteration << " iterations (residual of momentum " << residual_norm(0);
+           << iteration << " iterations (residual of momentum " << residual_norm(0, tolerance);
       if (unknowns.has_pressure())
-        text << ", of fluid mass " << residual_norm(1);
+        text << ", of fluid mass " << residual_norm(1, tolerance);
       text << "); use shorter steps, or more 'Newton iterations'";
       throw NumericalError(text.str());
     }
-    if ((iteration > 0 && converged()) || right_side.l2_norm() == 0.)
+    if ((iteration > 0 && converged(tolerance)) || right_side.l2_norm() == 0.)
       return;
     correction = 0.;
     done.linear_iterations += linear_solver.solve(correction, right_side);
@@ -306,7 +307,7 @@ void UpSolver<dim>::project_start()
 }
 
 template <int dim>
-void UpSolver<dim>::accept(const TimeLevel &level)
+void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
 {
   share_unknown();
   ghosted_rate = rate;
@@ -315,8 +316,12 @@ void UpSolver<dim>::accept(const TimeLevel &level)
   add_weight(level, weight, gravity_work);
   StepWork work;
   for (const auto &body : scene.bodies)
-    form->update_points(*body, level, state, ghosted_rate, volume_loads(level.time).gravity,
-                        method == Method::material_points, work);
+    form->update_points(*body, level, state, ghosted_rate, volume_loads(level.time).gravity, moves, work);
+  StepWork of_followers;
+  for (Scene<dim> *other : followers)
+    for (const auto &body : other->bodies)
+      form->update_points(*body, level, state, ghosted_rate, volume_loads(level.time).gravity, false,
+                          of_followers);
   const double dt = level.dt;
   const auto held = boundary.reactions(level, residual, unknown);
   const auto &loads = boundary.loads();
@@ -341,8 +346,9 @@ void UpSolver<dim>::accept(const TimeLevel &level)
     text << "a stress, pressure or velocity is not finite, t = " << now << " s, step " << dt << " s";
     throw NumericalError(text.str());
   }
-  move_tracers();
-  if (method == Method::material_points)
+  if (moves || method == Method::finite_elements)
+    move_tracers();
+  if (moves)
     relocate_points();
 }
 
@@ -420,13 +426,41 @@ void UpSolver<dim>::relocate_points()
     matrix_is_valid = false;
 }
 
+namespace {
+/// Applies an action to the rows of all points of scenes.
+template <int dim, typename Action>
+void for_each_point(const std::vector<Scene<dim> *> &scenes, const Action &action)
+{
+  for (Scene<dim> *scene : scenes)
+    for (const auto &body : scene->bodies)
+      for (const std::uint32_t handle : body->handles())
+        action(body->layout(), body->row(handle));
+}
+} // namespace
+
+template <int dim>
+void UpSolver<dim>::set_horizontal_stress(const double K0)
+{
+  std::vector<Scene<dim> *> scenes = followers;
+  scenes.push_back(&scene);
+  for_each_point<dim>(scenes, [&](const Layout &layout, double *row) {
+    double *stress = row + layout.stress;
+    for (unsigned int d = 0; d < 3; ++d)
+      if (d != dim - 1)
+        stress[d] = K0 * stress[dim - 1];
+    for (unsigned int c = 3; c < (dim == 2 ? 4 : 6); ++c)
+      stress[c] = 0.;
+  });
+}
+
 template <int dim>
 void UpSolver<dim>::reset_displacements()
 {
-  for (const auto &body : scene.bodies)
-    for (const std::uint32_t handle : body->handles())
-      for (unsigned int d = 0; d < dim; ++d)
-        body->row(handle)[body->layout().displacement + d] = 0.;
+  std::vector<Scene<dim> *> scenes = followers;
+  scenes.push_back(&scene);
+  for_each_point<dim>(scenes, [&](const Layout &layout, double *row) {
+    std::fill_n(row + layout.displacement, dim, 0.);
+  });
   for (auto &[name, tracers] : scene.surfaces)
     tracers.restart();
   if (scene.probes)

@@ -27,8 +27,9 @@ void UpSolver<dim>::solve_static()
   state.second_history = second;
   unknown = second;
   unknown.block(0) = 0.;
-  solve(level, now, now);
-  accept(level);
+  // One more iteration costs little, and rest is to be rest.
+  solve(level, now, now, 1e-12);
+  accept(level, false);
   first_step_done = false;
 }
 
@@ -141,7 +142,7 @@ void UpSolver<dim>::damped_step(const double dt)
   state.second_history = history;
   unknown = second;
   unknown.block(0).equ(dt, rate.block(0));
-  solve(level, now, now + dt);
+  solve(level, now, now + dt, parameters.newton_tolerance);
 
   second.block(0).equ(-1. / dt, rate.block(0));
   rate.block(0).equ(1. / dt, unknown.block(0));
@@ -150,7 +151,7 @@ void UpSolver<dim>::damped_step(const double dt)
     rate.block(1).equ(1. / dt, unknown.block(1));
     rate.block(1).add(-1. / dt, second.block(1));
   }
-  accept(level);
+  accept(level, method == Method::material_points);
 }
 
 template <int dim>
@@ -181,7 +182,7 @@ void UpSolver<dim>::generalised_alpha_step(const double dt)
   unknown = second;
   unknown.block(0).equ(dt, rate.block(0));
   unknown.block(0).add(0.5 * dt * dt, second.block(0));
-  solve(level, now, now + dt);
+  solve(level, now, now + dt, parameters.newton_tolerance);
 
   first = rate;
   next.block(0) = second.block(0);
@@ -193,7 +194,7 @@ void UpSolver<dim>::generalised_alpha_step(const double dt)
     rate.block(1).equ(1. / (gamma_p * dt), unknown.block(1));
     rate.block(1).add(-1. / (gamma_p * dt), second.block(1), 1. - 1. / gamma_p, first.block(1));
   }
-  accept(level);
+  accept(level, method == Method::material_points);
 }
 
 template <int dim>
@@ -221,7 +222,7 @@ double UpSolver<dim>::quasi_static_step(const double latest)
       first_step_done = true;
       TimeLevel level = this->level(now + dt, dt);
       level.velocity = level.pressure_rate = 1. / (stage_share * dt);
-      accept(level);
+      accept(level, method == Method::material_points);
       return dt;
     }
     ++done.rejected_steps;
@@ -244,7 +245,7 @@ double UpSolver<dim>::diagonally_implicit_step(const double dt)
   old.block(0) = 0.;
   state.second_history = old;
   unknown = old;
-  solve(level, now, now + g * dt);
+  solve(level, now, now + g * dt, parameters.newton_tolerance);
 
   // k_1 = (Y_1 - y_n)/(g dt);  k_2 = (Y_2 - y_n)/(g dt) - (1 - g)/g k_1
   BlockVector first = unknown;
@@ -254,7 +255,7 @@ double UpSolver<dim>::diagonally_implicit_step(const double dt)
   history *= -(1. - g) / g;
   state.rate_history = history;
   level.time = now + dt;
-  solve(level, now, now + dt);
+  solve(level, now, now + dt, parameters.newton_tolerance);
 
   // Against the first-order y_n + dt k_1.
   BlockVector difference = unknown;

@@ -30,6 +30,8 @@ struct StageParameters
   Solver solver = Solver::dynamic;
   double duration = 0.; ///< [s]
   bool reset_displacements = false;
+  bool static_on_points = true; ///< of material points: else on the finite element mesh
+  double K0 = 0.;               ///< static: horizontal over vertical effective stress; 0: from elasticity
   double local_damping = 0.;
 };
 
@@ -50,6 +52,10 @@ struct Case
   bool is_implicit() const;
   /// What the points store for the method.
   SchemeFields fields() const;
+  /// What Gauss points of the finite element method store.
+  SchemeFields gauss_fields() const;
+  /// Shape functions of displacements of the implicit solvers, by the method.
+  Nodes displacement_nodes() const;
 
   Section section; ///< the top of the file
   std::string title;

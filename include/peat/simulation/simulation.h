@@ -41,6 +41,10 @@ struct StepRecord
 template <int dim>
 Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid);
 
+/// The bodies of a case with Gauss points, and their surfaces; without conditions and probes. Collective.
+template <int dim>
+Scene<dim> make_gauss_scene(const Case<dim> &parameters, const Grid<dim> &grid);
+
 /// Runs the stages of a case and leaves an output directory.
 template <int dim>
 class Simulation
@@ -64,7 +68,7 @@ private:
   void run_implicit_stage(const StageParameters &stage, double start);
   void run_static_stage(const StageParameters &stage, double start);
   void begin_stage(const StageParameters &stage, const StableStep &step);
-  void make_up_solver(double start);
+  void make_up_solver(typename UpSolver<dim>::Method method, double start);
   unsigned long unknowns_of_solver() const;
   void report(double time, bool everything);
   void write_summary() const;

@@ -25,7 +25,9 @@ public:
   /// How the scene's points are used.
   enum class Method {
     finite_elements, ///< Gauss points, which stay where they are
-    material_points  ///< material points with the basis of the explicit method; quasi-static and static only
+    material_points, ///< material points with the basis of the explicit method; quasi-static and static only
+    points_at_rest   ///< the same for the skeleton alone, under the pressures that the points have, which act as
+                     ///< in the explicit step: what is in equilibrium here is at rest there
   };
 
   UpSolver(const ImplicitParameters &parameters, const LinearSolverParameters &linear, Method method,
@@ -50,8 +52,18 @@ public:
   /// does not pass.
   void solve_static();
 
+  /// Material points of another scene that are to take the same displacements and pressures, by the shape
+  /// functions at their places; `other` must live as long as this.
+  void lead(Scene<dim> &other) { followers.push_back(&other); }
+  /// Make the horizontal effective stresses of all points K0 times the vertical one, and the shear stresses
+  /// zero; to be followed by solve_static().
+  void set_horizontal_stress(double K0);
+
   /// Take displacements from where the bodies are now.
   void reset_displacements();
+
+  /// Begin the balances anew.
+  void forget_work() { book = {}; }
 
   double time() const override { return now; }
   void set_time(const double time) override { now = time; }
@@ -80,17 +92,18 @@ private:
   double diagonally_implicit_step(double dt);
 
   /// Find the unknowns at the end of [start, end] that satisfy the equations at a level.
-  void solve(const TimeLevel &level, double start, double end);
+  void solve(const TimeLevel &level, double start, double end, double tolerance);
   void assemble(const TimeLevel &level, bool with_matrix);
   bool needs_matrix(const TimeLevel &level) const;
-  double residual_norm(unsigned int block) const;
-  bool converged() const;
+  /// Over the larger of the scale of the residuals so far and round-off over the tolerance.
+  double residual_norm(unsigned int block, double tolerance) const;
+  bool converged(double tolerance) const;
   void line_search(const TimeLevel &level, double before);
   /// What is prescribed, or held by nothing, stands for itself.
   void fill_empty_diagonal(const TimeLevel &level);
   void share_unknown();
   /// After the unknowns have been found: points, tracers, balances.
-  void accept(const TimeLevel &level);
+  void accept(const TimeLevel &level, bool moves);
   void add_weight(const TimeLevel &level, dealii::Tensor<1, dim> &weight, double &work) const;
   void move_tracers();
   void relocate_points();
@@ -102,6 +115,7 @@ private:
   const Grid<dim> &grid;
   Scene<dim> &scene;
   const bool linear;
+  std::vector<Scene<dim> *> followers;
 
   Space<dim> unknowns;
   ActiveNodes<dim> active;
