@@ -82,6 +82,8 @@ Place<dim>::Place(Section section, const std::vector<std::string> &body_names)
 template <int dim>
 bool Place<dim>::contains(const SurfacePoint<dim> &point) const
 {
+  if (point.adjoins)
+    return false;
   if (direction >= 0) {
     const int axis = direction / 2, sign = direction % 2 ? 1 : -1;
     for (int d = 0; d < dim; ++d)

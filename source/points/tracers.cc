@@ -223,6 +223,14 @@ void Tracers<dim>::cover(const Shape<dim> &shape, const unsigned int pieces_per_
 }
 
 template <int dim>
+void Tracers<dim>::find_adjoining(const std::function<bool(const dealii::Point<dim> &)> &is_in_other_body)
+{
+  for (Tracer &tracer : list)
+    tracer.adjoins = is_in_other_body(tracer.initial_position + 1e-4 * grid.smallest_cell_size() /
+                                                                    tracer.area.norm() * tracer.area);
+}
+
+template <int dim>
 CellId Tracers<dim>::carrier(const Tracer &tracer, const ActiveNodes<dim> &nodes) const
 {
   const CellId own = own_cell(tracer);
@@ -341,6 +349,7 @@ void Tracers<dim>::locate(const ActiveNodes<dim> &nodes)
     point.initial_position = list[t].initial_position;
     point.position = list[t].position;
     point.area = list[t].area;
+    point.adjoins = list[t].adjoins;
     const CellId cell = carrier_cell[t] = carrier(list[t], nodes);
     if (cell == no_index) {
       point.node.fill(0);
@@ -414,7 +423,7 @@ bool Tracers<dim>::leaves_rank() const
 template <int dim>
 void Tracers<dim>::migrate()
 {
-  constexpr unsigned int n_values = 1 + 3 * dim;
+  constexpr unsigned int n_values = 2 + 3 * dim;
   std::map<unsigned int, std::vector<double>> outgoing;
   std::vector<Tracer> staying;
   for (const Tracer &tracer : list) {
@@ -432,6 +441,7 @@ void Tracers<dim>::migrate()
       values.push_back(tracer.position[d]);
       values.push_back(tracer.area[d]);
     }
+    values.push_back(tracer.adjoins);
   }
   const auto incoming = dealii::Utilities::MPI::some_to_some(grid.communicator(), outgoing);
   for (const auto &[rank, values] : incoming)
@@ -443,6 +453,7 @@ void Tracers<dim>::migrate()
         tracer.position[d] = values[i + 2 + 3 * d];
         tracer.area[d] = values[i + 3 + 3 * d];
       }
+      tracer.adjoins = values[i + 1 + 3 * dim] != 0.;
       staying.push_back(tracer);
     }
   list.swap(staying);

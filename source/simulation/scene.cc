@@ -22,6 +22,20 @@ void check_inside_mesh(const BodyParameters<dim> &body, const GridParameters<dim
                                      "shape with intersection(..., box(...))");
   }
 }
+
+template <int dim>
+void cover(const Case<dim> &parameters, const std::string &name, const unsigned int gauss_points,
+           Tracers<dim> &surface)
+{
+  for (const auto &body : parameters.bodies)
+    if (body.name == name)
+      surface.cover(*body.shape, body.points_per_direction, gauss_points);
+  surface.find_adjoining([&](const dealii::Point<dim> &x) {
+    return std::any_of(parameters.bodies.begin(), parameters.bodies.end(), [&](const auto &other) {
+      return other.name != name && other.shape->distance(x) < 0.;
+    });
+  });
+}
 } // namespace
 
 template <int dim>
@@ -35,12 +49,8 @@ Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid)
                                                        parameters.fields()));
   }
   const auto add_surface = [&](const std::string &name) {
-    if (scene.surfaces.find(name) != scene.surfaces.end())
-      return;
-    auto &surface = scene.surfaces.emplace(name, grid).first->second;
-    for (const auto &body : parameters.bodies)
-      if (body.name == name)
-        surface.cover(*body.shape, body.points_per_direction, parameters.fields().gauss_points);
+    if (scene.surfaces.find(name) == scene.surfaces.end())
+      cover(parameters, name, parameters.fields().gauss_points, scene.surfaces.emplace(name, grid).first->second);
   };
   for (auto &condition : parameters.conditions)
     if (!condition->surface_of().empty())
@@ -72,8 +82,7 @@ Scene<dim> make_gauss_scene(const Case<dim> &parameters, const Grid<dim> &grid)
   for (const auto &body : parameters.bodies) {
     scene.bodies.push_back(
         std::make_unique<Body<dim>>(body, parameters.material(body.material), grid, fields));
-    scene.surfaces.emplace(body.name, grid)
-        .first->second.cover(*body.shape, body.points_per_direction, fields.gauss_points);
+    cover(parameters, body.name, fields.gauss_points, scene.surfaces.emplace(body.name, grid).first->second);
   }
   return scene;
 }

@@ -16,6 +16,7 @@ struct SurfacePoint
   dealii::Point<dim> initial_position;
   dealii::Point<dim> position;
   dealii::Tensor<1, dim> area; ///< outward normal times area [m^(dim-1)]
+  bool adjoins = false;        ///< another body lay behind it at the start: no load acts there
   std::array<std::uint32_t, n_nodes> node;
   std::array<double, n_nodes> N;
 };

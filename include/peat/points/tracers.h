@@ -21,6 +21,7 @@ public:
     dealii::Point<dim> initial_position;
     dealii::Point<dim> position;
     dealii::Tensor<1, dim> area; ///< outward normal times area; zero for a probe
+    bool adjoins = false;        ///< see SurfacePoint
   };
 
   explicit Tracers(const Grid<dim> &grid) : grid(grid) {}
@@ -31,6 +32,9 @@ public:
   /// cell and direction. Faces that lie on the edge of the mesh are left out.
   /// With `gauss_points` > 0: so many Gauss points per direction on whole faces of cells.
   void cover(const Shape<dim> &shape, unsigned int pieces_per_direction, unsigned int gauss_points = 0);
+
+  /// Mark the pieces behind which another body lies.
+  void find_adjoining(const std::function<bool(const dealii::Point<dim> &)> &is_in_other_body);
 
   /// Put pieces of surface that are normal to an axis where the body's points see its surface: at the edge of
   /// the points' domains (GIMP), or as high in their cell as the volume of the points below fills it (Q1). A
