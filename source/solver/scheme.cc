@@ -11,7 +11,7 @@ SchemeParameters::SchemeParameters(Section section)
       "Shape functions of the points. 'q1': FE_Q(1), cheapest, for points that stay in their cells. 'gimp': "
       "FE_Q(1) averaged over the point's domain, ten to a hundred times less noise when points cross faces.");
   section.add(
-      "Transfer", transfer, {"dflip", "flip", "pic"},
+      "Transfer", transfer, {"aflip", "tpic", "dflip", "flip", "pic"},
       "How velocities go from points to nodes and back. 'flip': points add the grid's acceleration. 'dflip': "
       "the "
       "same, but nodes keep their velocity and take up only how the points differ from it, which removes the "
@@ -45,7 +45,8 @@ SchemeParameters::SchemeParameters(Section section)
   section.add("Time step", fixed_step, nonnegative("s"), "A fixed step; 0 for the automatic one.");
   basis = basis_name == "q1" ? Basis::q1 : Basis::gimp;
   nodes_keep_velocity = transfer == "dflip";
-  grid_velocity = transfer == "pic";
+  affine = transfer == "aflip" || transfer == "tpic";
+  grid_velocity = transfer == "pic" || transfer == "tpic";
   stress_update = update == "usl" || (update == "auto" && basis == Basis::gimp) ? StressUpdate::last
                                                                                 : StressUpdate::modified_last;
 }

@@ -47,6 +47,17 @@ double PointKernels<dim, reach, saturated>::mean_pressure(const Body<dim> &body,
 }
 
 template <int dim, unsigned int reach, bool saturated>
+void PointKernels<dim, reach, saturated>::node_offsets(const std::array<CellInterval, dim> &cell,
+                                                       NodeLanes (*offset)[Chunks::n])
+{
+  for (unsigned int d = 0; d < dim; ++d) {
+    const double at[4] = {-cell[d].size_below, 0., cell[d].size, cell[d].size + cell[d].size_above};
+    for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk)
+      offset[d][chunk] = Chunks::spread(reach == 4 ? at : at + 1, d, chunk);
+  }
+}
+
+template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                   const double *kept, const PressureUpdate &pressure,
                                                   double *sums, const unsigned int stride) const
@@ -64,6 +75,8 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
   // Per point: what the node vectors are multiplied with.
   alignas(64) double momentum[2 * dim][n_lanes], total_stress[6][n_lanes], darcy[3][n_lanes];
   alignas(64) double local_kept[dim + 1][Chunks::n_nodes];
+  alignas(64) double affine[dim * dim][n_lanes];
+  alignas(64) NodeLanes offset[dim][Chunks::n];
 
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
@@ -71,6 +84,7 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
     if (kept)
       gather<dim + 1>(kept, cell_nodes, local_kept);
     alignas(64) NodeLanes local[n_sums][Chunks::n] = {};
+    node_offsets(cell, offset);
     const double mean_p = saturated && pressure.cell_means ? mean_pressure(body, slice) : 0.;
 
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
@@ -88,6 +102,13 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
         reinterpret_cast<Lanes &>(momentum[d]) = m * difference;
         reinterpret_cast<Lanes &>(momentum[dim + d]) = m * v;
       }
+      if (layout.velocity_gradient >= 0)
+        for (unsigned int d = 0; d < dim; ++d)
+          for (unsigned int e = 0; e < dim; ++e) {
+            const Lanes mC = m * batch.load(layout.velocity_gradient + d * dim + e);
+            reinterpret_cast<Lanes &>(affine[d * dim + e]) = mC;
+            reinterpret_cast<Lanes &>(momentum[d]) -= mC * (x[e] - cell[e].lower);
+          }
       const Lanes V = batch.load(layout.volume);
       Lanes alpha_p = broadcast(0.);
       if constexpr (saturated) {
@@ -110,8 +131,16 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
         for (unsigned int l = 0; l < batch.n; ++l) {
           const ShapeAtNodes<dim, reach> shape(w, l, chunk);
           sum[S::mass] += m[l] * shape.N;
-          for (unsigned int d = 0; d < dim; ++d)
-            sum[S::momentum + d] += momentum[d][l] * shape.N;
+          if (layout.velocity_gradient >= 0)
+            for (unsigned int d = 0; d < dim; ++d) {
+              NodeLanes v = momentum[d][l] + affine[d * dim][l] * offset[0][chunk];
+              for (unsigned int e = 1; e < dim; ++e)
+                v += affine[d * dim + e][l] * offset[e][chunk];
+              sum[S::momentum + d] += v * shape.N;
+            }
+          else
+            for (unsigned int d = 0; d < dim; ++d)
+              sum[S::momentum + d] += momentum[d][l] * shape.N;
           if (kept)
             for (unsigned int d = 0; d < dim; ++d)
               sum[full + d] += momentum[dim + d][l] * shape.N;
@@ -177,24 +206,41 @@ void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, con
   std::array<Lanes, dim> x, velocity;
   Weights<dim, reach> lane_weights;
   alignas(64) double local_a[dim][Chunks::n_nodes], local_v[dim][Chunks::n_nodes];
+  alignas(64) double affine[dim * dim][n_lanes];
+  alignas(64) NodeLanes offset[dim][Chunks::n];
 
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(a, cell_nodes, local_a);
     gather(v, cell_nodes, local_v);
+    node_offsets(cell, offset);
     alignas(64) NodeLanes local[dim][Chunks::n] = {};
 
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, lane_weights);
       advance(body, batch, lane_weights, local_a, local_v, update, velocity);
+      if (layout.velocity_gradient >= 0)
+        for (unsigned int d = 0; d < dim; ++d) {
+          Lanes value, gradient[dim];
+          interpolate<dim, reach>(local_v[d], lane_weights, value, gradient);
+          for (unsigned int e = 0; e < dim; ++e) {
+            reinterpret_cast<Lanes &>(affine[d * dim + e]) = gradient[e];
+            velocity[d] -= gradient[e] * (x[e] - cell[e].lower);
+          }
+        }
       const PointwiseWeights<dim, reach> w(lane_weights);
       for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk)
         for (unsigned int l = 0; l < batch.n; ++l) {
           const NodeLanes mN = batch.row[l][layout.mass] * ShapeAtNodes<dim, reach>::value(w, l, chunk);
-          for (unsigned int d = 0; d < dim; ++d)
-            local[d][chunk] += mN * velocity[d][l];
+          for (unsigned int d = 0; d < dim; ++d) {
+            NodeLanes vd = velocity[d][l] + NodeLanes{};
+            if (layout.velocity_gradient >= 0)
+              for (unsigned int e = 0; e < dim; ++e)
+                vd += affine[d * dim + e][l] * offset[e][chunk];
+            local[d][chunk] += mN * vd;
+          }
         }
     }
     for (unsigned int i = 0; i < Chunks::n_nodes; ++i)
@@ -265,6 +311,9 @@ void PointKernels<dim, reach, saturated>::deform_batch(
     divergence += gradient[d];
     for (unsigned int e = 0; e < dim; ++e)
       du[3 * d + e] = dt * gradient[e];
+    if (layout.velocity_gradient >= 0)
+      for (unsigned int e = 0; e < dim; ++e)
+        batch.store(layout.velocity_gradient + d * dim + e, gradient[e]);
   }
 
   StressLanes stress = {};

@@ -115,6 +115,9 @@ private:
   static Lanes divergence_of(const Weights<dim, reach> &weights, const double (*field)[Chunks::n_nodes]);
   static double mean_pressure(const Body<dim> &body, const Slice &slice);
 
+  /// Places of the nodes that a cell's points reach, relative to the cell's lower corner.
+  static void node_offsets(const std::array<CellInterval, dim> &cell, NodeLanes (*offset)[Chunks::n]);
+
   static void filter_pressure(Body<dim> &body, const Slice &slice, const double share);
 };
 } // namespace peat

@@ -13,6 +13,7 @@ constexpr unsigned int max_state_columns = 32;
 struct SchemeFields
 {
   bool extent = false;
+  bool velocity_gradient = false;
 };
 
 /// The columns of a body's points: what is stored, under which name, and where in the row of a point. A body
@@ -42,6 +43,7 @@ struct Layout
   int mass = -1;            ///< [kg]
   int volume = -1;          ///< [m^dim]; per metre of depth in 2-D
   int velocity = -1;        ///< [m/s]
+  int velocity_gradient = -1; ///< [1/s], row by row: dv_x/dx, dv_x/dy, ...; affine transfers
   int displacement = -1;    ///< [m] since the start
   int stress = -1;          ///< effective Cauchy stress [Pa]
   int pressure = -1;        ///< pore pressure [Pa]; saturated bodies

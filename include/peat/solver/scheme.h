@@ -18,7 +18,7 @@ struct SchemeParameters
     modified_last ///< MUSL: from the points' new velocities, mapped back to the nodes
   };
 
-  SchemeFields fields() const { return {basis == Basis::gimp}; }
+  SchemeFields fields() const { return {basis == Basis::gimp, affine}; }
   /// Share of the points' own velocity that survives a step of length dt.
   double retention(double dt) const;
 
@@ -26,6 +26,7 @@ struct SchemeParameters
   StressUpdate stress_update;
   bool nodes_keep_velocity;    ///< only the points' difference from the nodes' last velocity is mapped to the
                                ///< nodes
+  bool affine;                 ///< the points' velocity is mapped with its gradient
   bool grid_velocity;          ///< the points take the grid's velocity each step (PIC)
   double relaxation_time = 0.; ///< of the points' velocity towards the grid's [s]; 0: never
   double local_damping = 0.;   ///< share of the out-of-balance force that opposes the velocity
