@@ -86,9 +86,9 @@ void fill_row(std::vector<double> &row, const Layout &layout, const Material &ma
       below[e] -= half_extent[e];
       above[e] += half_extent[e];
       for (unsigned int d = 0; d < dim; ++d)
-        row[layout.velocity_gradient + d * dim + e] =
-            (parameters.initial_velocity.value(above, 0., d) - parameters.initial_velocity.value(below, 0., d)) /
-            (2. * half_extent[e]);
+        row[layout.velocity_gradient + d * dim + e] = (parameters.initial_velocity.value(above, 0., d) -
+                                                       parameters.initial_velocity.value(below, 0., d)) /
+                                                      (2. * half_extent[e]);
     }
   for (unsigned int c = 0; c < parameters.initial_stress.n_components(); ++c)
     row[layout.stress + c] = parameters.initial_stress.value(x, 0., c);

@@ -59,12 +59,11 @@ void PointKernels<dim, reach, saturated>::node_offsets(const std::array<CellInte
 
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes,
-                                                  const double *kept, const PressureUpdate &pressure,
-                                                  double *sums, const unsigned int stride) const
+                                                  const PressureUpdate &pressure, double *sums,
+                                                  const unsigned int stride) const
 {
   using S = Sums<dim>;
-  constexpr unsigned int full = S::full_momentum(saturated), n_sums = full + dim;
-  const unsigned int n_used = kept ? n_sums : full;
+  constexpr unsigned int n_sums = S::n_columns(saturated);
   const Layout &layout = body.layout();
   const Mixture *mixture = body.material().mixture();
   const FluidLanes at_start = fluid_at_start(mixture);
@@ -73,16 +72,13 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
   std::array<Lanes, dim> x;
   Weights<dim, reach> lane_weights;
   // Per point: what the node vectors are multiplied with.
-  alignas(64) double momentum[2 * dim][n_lanes], total_stress[6][n_lanes], darcy[3][n_lanes];
-  alignas(64) double local_kept[dim + 1][Chunks::n_nodes];
+  alignas(64) double momentum[dim][n_lanes], total_stress[6][n_lanes], darcy[3][n_lanes];
   alignas(64) double affine[dim * dim][n_lanes];
   alignas(64) NodeLanes offset[dim][Chunks::n];
 
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
-    if (kept)
-      gather<dim + 1>(kept, cell_nodes, local_kept);
     alignas(64) NodeLanes local[n_sums][Chunks::n] = {};
     node_offsets(cell, offset);
     const double mean_p = saturated && pressure.cell_means ? mean_pressure(body, slice) : 0.;
@@ -92,16 +88,8 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
       evaluate(body, batch, cell, x, lane_weights);
       const PointwiseWeights<dim, reach> w(lane_weights);
       const Lanes m = batch.load(layout.mass);
-      const Lanes keeping = kept ? interpolate<dim, reach>(local_kept[dim], lane_weights) : broadcast(1.);
-      for (unsigned int d = 0; d < dim; ++d) {
-        const Lanes v = batch.load(layout.velocity + d);
-        Lanes difference = v;
-        if (kept)
-          difference = keeping > 1e-3 ? v - interpolate<dim, reach>(local_kept[d], lane_weights) / keeping
-                                      : broadcast(0.);
-        reinterpret_cast<Lanes &>(momentum[d]) = m * difference;
-        reinterpret_cast<Lanes &>(momentum[dim + d]) = m * v;
-      }
+      for (unsigned int d = 0; d < dim; ++d)
+        reinterpret_cast<Lanes &>(momentum[d]) = m * batch.load(layout.velocity + d);
       if (layout.velocity_gradient >= 0)
         for (unsigned int d = 0; d < dim; ++d)
           for (unsigned int e = 0; e < dim; ++e) {
@@ -141,9 +129,6 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
           else
             for (unsigned int d = 0; d < dim; ++d)
               sum[S::momentum + d] += momentum[d][l] * shape.N;
-          if (kept)
-            for (unsigned int d = 0; d < dim; ++d)
-              sum[full + d] += momentum[dim + d][l] * shape.N;
           if constexpr (dim == 2) {
             sum[S::force] -= total_stress[0][l] * shape.dN[0] + total_stress[3][l] * shape.dN[1];
             sum[S::force + 1] -= total_stress[3][l] * shape.dN[0] + total_stress[1][l] * shape.dN[1];
@@ -169,7 +154,7 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
 
     for (unsigned int i = 0; i < Chunks::n_nodes; ++i) {
       double *out = sums + std::size_t(cell_nodes[i]) * stride;
-      for (unsigned int c = 0; c < n_used; ++c)
+      for (unsigned int c = 0; c < n_sums; ++c)
         out[c] += local[c][i / Chunks::width][i % Chunks::width];
     }
   }
@@ -198,6 +183,7 @@ void PointKernels<dim, reach, saturated>::advance(const Body<dim> &body, const B
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                             const double *a, const double *v,
+                                                            const AffineField &affine_field,
                                                             const VelocityUpdate &update,
                                                             double *momentum) const
 {
@@ -206,7 +192,7 @@ void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, con
   std::array<Lanes, dim> x, velocity;
   Weights<dim, reach> lane_weights;
   alignas(64) double local_a[dim][Chunks::n_nodes], local_v[dim][Chunks::n_nodes];
-  alignas(64) double affine[dim * dim][n_lanes];
+  alignas(64) double local_affine[dim][Chunks::n_nodes], affine[dim * dim][n_lanes];
   alignas(64) NodeLanes offset[dim][Chunks::n];
 
   for (const Slice &slice : body.slices()) {
@@ -214,6 +200,8 @@ void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, con
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(a, cell_nodes, local_a);
     gather(v, cell_nodes, local_v);
+    if (layout.velocity_gradient >= 0)
+      gather(affine_field.velocity, cell_nodes, local_affine);
     node_offsets(cell, offset);
     alignas(64) NodeLanes local[dim][Chunks::n] = {};
 
@@ -224,7 +212,7 @@ void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, con
       if (layout.velocity_gradient >= 0)
         for (unsigned int d = 0; d < dim; ++d) {
           Lanes value, gradient[dim];
-          interpolate<dim, reach>(local_v[d], lane_weights, value, gradient);
+          interpolate<dim, reach>(local_affine[d], lane_weights, value, gradient);
           for (unsigned int e = 0; e < dim; ++e) {
             reinterpret_cast<Lanes &>(affine[d * dim + e]) = gradient[e];
             velocity[d] -= gradient[e] * (x[e] - cell[e].lower);
@@ -295,7 +283,8 @@ template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::deform_batch(
     Body<dim> &body, const Batch<double> &batch, const std::array<CellInterval, dim> &cell,
     const std::array<Lanes, dim> &x, const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
-    const double (*w)[Chunks::n_nodes], const double dt, const Divergences *cell_mean, StepFindings &findings)
+    const double (*w)[Chunks::n_nodes], const double (*affine)[Chunks::n_nodes], const double dt,
+    const Divergences *cell_mean, StepFindings &findings)
 {
   const Layout &layout = body.layout();
   const Law &law = body.material().law();
@@ -311,6 +300,10 @@ void PointKernels<dim, reach, saturated>::deform_batch(
     divergence += gradient[d];
     for (unsigned int e = 0; e < dim; ++e)
       du[3 * d + e] = dt * gradient[e];
+    if (affine) {
+      Lanes value;
+      interpolate<dim, reach>(affine[d], weights, value, gradient);
+    }
     if (layout.velocity_gradient >= 0)
       for (unsigned int e = 0; e < dim; ++e)
         batch.store(layout.velocity_gradient + d * dim + e, gradient[e]);
@@ -405,17 +398,20 @@ void PointKernels<dim, reach, saturated>::filter_pressure(Body<dim> &body, const
 
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
-                                                 const double *v, const double *w, const double dt,
-                                                 const PressureUpdate &pressure, StepFindings &findings) const
+                                                 const double *v, const double *w, const AffineField &affine,
+                                                 const double dt, const PressureUpdate &pressure,
+                                                 StepFindings &findings) const
 {
   Batch<double> batch;
   std::array<Lanes, dim> x;
   Weights<dim, reach> weights;
-  alignas(64) double local_v[dim][Chunks::n_nodes], local_w[dim][Chunks::n_nodes];
+  alignas(64) double local_v[dim][Chunks::n_nodes], local_w[dim][Chunks::n_nodes],
+      local_affine[dim][Chunks::n_nodes];
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(v, cell_nodes, local_v);
+    const auto own_affine = gather_affine(body, affine, slice.cell, nodes, local_affine);
     const bool averaged = saturated && pressure.cell_means;
     Divergences mean{};
     if constexpr (saturated) {
@@ -426,7 +422,8 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, weights);
-      deform_batch(body, batch, cell, x, weights, local_v, local_w, dt, averaged ? &mean : nullptr, findings);
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, own_affine, dt,
+                   averaged ? &mean : nullptr, findings);
     }
     if (saturated && pressure.filter > 0.)
       filter_pressure(body, slice, pressure.filter);
@@ -436,7 +433,8 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                              const double *a, const double *v,
-                                                             const double *w, const VelocityUpdate &update,
+                                                             const double *w, const AffineField &affine,
+                                                             const VelocityUpdate &update,
                                                              const PressureUpdate &pressure,
                                                              StepFindings &findings) const
 {
@@ -444,12 +442,13 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, co
   std::array<Lanes, dim> x, velocity;
   Weights<dim, reach> weights;
   alignas(64) double local_a[dim][Chunks::n_nodes], local_v[dim][Chunks::n_nodes],
-      local_w[dim][Chunks::n_nodes];
+      local_w[dim][Chunks::n_nodes], local_affine[dim][Chunks::n_nodes];
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(a, cell_nodes, local_a);
     gather(v, cell_nodes, local_v);
+    const auto own_affine = gather_affine(body, affine, slice.cell, nodes, local_affine);
     const bool averaged = saturated && pressure.cell_means;
     Divergences mean{};
     if constexpr (saturated) {
@@ -461,8 +460,8 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, co
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, weights);
       advance(body, batch, weights, local_a, local_v, update, velocity);
-      deform_batch(body, batch, cell, x, weights, local_v, local_w, update.dt, averaged ? &mean : nullptr,
-                   findings);
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, own_affine, update.dt,
+                   averaged ? &mean : nullptr, findings);
     }
     if (saturated && pressure.filter > 0.)
       filter_pressure(body, slice, pressure.filter);
