@@ -129,36 +129,17 @@ void ExplicitMPM<dim>::find_small_nodes()
   }
   active.max_over_ranks(full_mass.data(), 1);
 
-  // Nodes on a face of a body that fills its cells have half of it, those on its edges and corners less.
+  // Of a body that fills its cells a node on a face has half of it, one on an edge or corner an eighth at
+  // least.
+  constexpr double small_share = 0.1;
   std::vector<char> small(active.size(), 0);
-  small_nodes.clear();
   for (std::size_t i = 0; i < active.size(); ++i)
-    if (nodal.sums[i * nodal.n_sums + Sums<dim>::mass] < 0.4 * full_mass[i]) {
-      small[i] = 1;
-      small_nodes.push_back({std::uint32_t(i), 0.4 * full_mass[i]});
-    }
+    small[i] = nodal.sums[i * nodal.n_sums + Sums<dim>::mass] < small_share * full_mass[i];
   near_small_node.assign(active.occupied_cells().size(), 0);
   for (std::size_t c = 0; c < near_small_node.size(); ++c) {
     const std::uint32_t *cell_nodes = active.cell_nodes(active.occupied_cells()[c]);
     for (unsigned int i = 0; i < active.nodes_per_cell(); ++i)
       near_small_node[c] |= small[cell_nodes[i]];
-  }
-}
-
-template <int dim>
-void ExplicitMPM<dim>::find_affine_velocity()
-{
-  // A node with little mass has large accelerations. A point that it reaches feels them by the node's weight;
-  // gradients must not feel them more.
-  find_small_nodes();
-  affine_velocity = nodal.new_velocity;
-  for (const auto &[i, mass] : small_nodes) {
-    const double missing =
-        std::max(0., 1. - nodal.sums[std::size_t(i) * nodal.n_sums + Sums<dim>::mass] / mass);
-    for (unsigned int d = 0; d < dim; ++d) {
-      const std::size_t row = std::size_t(i) * dim + d;
-      affine_velocity[row] -= missing * (nodal.new_velocity[row] - nodal.velocity[row]);
-    }
   }
 }
 
@@ -309,20 +290,21 @@ void ExplicitMPM<dim>::nodes_to_points()
   findings = {};
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
   const double *v = nodal.new_velocity.data(), *a = nodal.acceleration.data(), *w = nodal.flux.data();
-  AffineField affine{nullptr, nullptr};
-  if (scheme.affine) {
-    find_affine_velocity();
-    affine = {affine_velocity.data(), near_small_node.data()};
-  }
+  // A node with little mass has large accelerations. A point that it reaches feels them by the node's weight,
+  // but the gradient of its velocity would feel them in full, and bring them back to the node.
+  if (scheme.affine)
+    find_small_nodes();
+  const char *spin_only = scheme.affine ? near_small_node.data() : nullptr;
   if (scheme.stress_update == SchemeParameters::StressUpdate::last) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-      kernels[b]->advance_and_deform(*scene.bodies[b], active, a, v, w, affine, update, pressure_update(b),
+      kernels[b]->advance_and_deform(*scene.bodies[b], active, a, v, w, spin_only, update, pressure_update(b),
                                      findings);
     return;
   }
   std::fill(carrying_velocity.begin(), carrying_velocity.end(), 0.);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    kernels[b]->advance_and_remap(*scene.bodies[b], active, a, v, affine, update, carrying_velocity.data());
+    kernels[b]->advance_and_remap(*scene.bodies[b], active, a, v, spin_only, update,
+                                  carrying_velocity.data());
   active.sum_over_ranks(carrying_velocity.data(), dim);
   for (std::size_t i = 0; i < active.size(); ++i) {
     const double m = nodal.sums[i * nodal.n_sums + Sums<dim>::mass];
@@ -332,7 +314,7 @@ void ExplicitMPM<dim>::nodes_to_points()
   for (const auto &condition : scene.conditions)
     condition->constrain_velocity(active, now + nodal.dt, nodal.dt, carrying_velocity);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    kernels[b]->deform(*scene.bodies[b], active, carrying_velocity.data(), w, {nullptr, nullptr}, nodal.dt,
+    kernels[b]->deform(*scene.bodies[b], active, carrying_velocity.data(), w, spin_only, nodal.dt,
                        pressure_update(b), findings);
 }
 

@@ -62,6 +62,18 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
                                                   const PressureUpdate &pressure, double *sums,
                                                   const unsigned int stride) const
 {
+  if (body.layout().velocity_gradient >= 0)
+    scatter_points<true>(body, nodes, pressure, sums, stride);
+  else
+    scatter_points<false>(body, nodes, pressure, sums, stride);
+}
+
+template <int dim, unsigned int reach, bool saturated>
+template <bool affine>
+void PointKernels<dim, reach, saturated>::scatter_points(const Body<dim> &body, const ActiveNodes<dim> &nodes,
+                                                         const PressureUpdate &pressure, double *sums,
+                                                         const unsigned int stride)
+{
   using S = Sums<dim>;
   constexpr unsigned int n_sums = S::n_columns(saturated);
   const Layout &layout = body.layout();
@@ -73,14 +85,15 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
   Weights<dim, reach> lane_weights;
   // Per point: what the node vectors are multiplied with.
   alignas(64) double momentum[dim][n_lanes], total_stress[6][n_lanes], darcy[3][n_lanes];
-  alignas(64) double affine[dim * dim][n_lanes];
+  alignas(64) double mC[dim * dim][n_lanes];
   alignas(64) NodeLanes offset[dim][Chunks::n];
 
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     alignas(64) NodeLanes local[n_sums][Chunks::n] = {};
-    node_offsets(cell, offset);
+    if constexpr (affine)
+      node_offsets(cell, offset);
     const double mean_p = saturated && pressure.cell_means ? mean_pressure(body, slice) : 0.;
 
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
@@ -90,12 +103,12 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
       const Lanes m = batch.load(layout.mass);
       for (unsigned int d = 0; d < dim; ++d)
         reinterpret_cast<Lanes &>(momentum[d]) = m * batch.load(layout.velocity + d);
-      if (layout.velocity_gradient >= 0)
+      if constexpr (affine)
         for (unsigned int d = 0; d < dim; ++d)
           for (unsigned int e = 0; e < dim; ++e) {
-            const Lanes mC = m * batch.load(layout.velocity_gradient + d * dim + e);
-            reinterpret_cast<Lanes &>(affine[d * dim + e]) = mC;
-            reinterpret_cast<Lanes &>(momentum[d]) -= mC * (x[e] - cell[e].lower);
+            const Lanes c = m * batch.load(layout.velocity_gradient + d * dim + e);
+            reinterpret_cast<Lanes &>(mC[d * dim + e]) = c;
+            reinterpret_cast<Lanes &>(momentum[d]) -= c * (x[e] - cell[e].lower);
           }
       const Lanes V = batch.load(layout.volume);
       Lanes alpha_p = broadcast(0.);
@@ -119,11 +132,11 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
         for (unsigned int l = 0; l < batch.n; ++l) {
           const ShapeAtNodes<dim, reach> shape(w, l, chunk);
           sum[S::mass] += m[l] * shape.N;
-          if (layout.velocity_gradient >= 0)
+          if constexpr (affine)
             for (unsigned int d = 0; d < dim; ++d) {
-              NodeLanes v = momentum[d][l] + affine[d * dim][l] * offset[0][chunk];
+              NodeLanes v = momentum[d][l] + mC[d * dim][l] * offset[0][chunk];
               for (unsigned int e = 1; e < dim; ++e)
-                v += affine[d * dim + e][l] * offset[e][chunk];
+                v += mC[d * dim + e][l] * offset[e][chunk];
               sum[S::momentum + d] += v * shape.N;
             }
           else
@@ -183,7 +196,7 @@ void PointKernels<dim, reach, saturated>::advance(const Body<dim> &body, const B
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                             const double *a, const double *v,
-                                                            const AffineField &affine_field,
+                                                            const char *spin_only,
                                                             const VelocityUpdate &update,
                                                             double *momentum) const
 {
@@ -192,7 +205,7 @@ void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, con
   std::array<Lanes, dim> x, velocity;
   Weights<dim, reach> lane_weights;
   alignas(64) double local_a[dim][Chunks::n_nodes], local_v[dim][Chunks::n_nodes];
-  alignas(64) double local_affine[dim][Chunks::n_nodes], affine[dim * dim][n_lanes];
+  alignas(64) double affine[dim * dim][n_lanes];
   alignas(64) NodeLanes offset[dim][Chunks::n];
 
   for (const Slice &slice : body.slices()) {
@@ -200,8 +213,7 @@ void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, con
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(a, cell_nodes, local_a);
     gather(v, cell_nodes, local_v);
-    if (layout.velocity_gradient >= 0)
-      gather(affine_field.velocity, cell_nodes, local_affine);
+    const bool spin = spin_only && spin_only[nodes.occupied_index(slice.cell)];
     node_offsets(cell, offset);
     alignas(64) NodeLanes local[dim][Chunks::n] = {};
 
@@ -209,15 +221,20 @@ void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, con
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, lane_weights);
       advance(body, batch, lane_weights, local_a, local_v, update, velocity);
-      if (layout.velocity_gradient >= 0)
+      if (layout.velocity_gradient >= 0) {
+        Lanes C[dim][dim];
         for (unsigned int d = 0; d < dim; ++d) {
-          Lanes value, gradient[dim];
-          interpolate<dim, reach>(local_affine[d], lane_weights, value, gradient);
-          for (unsigned int e = 0; e < dim; ++e) {
-            reinterpret_cast<Lanes &>(affine[d * dim + e]) = gradient[e];
-            velocity[d] -= gradient[e] * (x[e] - cell[e].lower);
-          }
+          Lanes value;
+          interpolate<dim, reach>(local_v[d], lane_weights, value, C[d]);
         }
+        if (spin)
+          keep_spin(C);
+        for (unsigned int d = 0; d < dim; ++d)
+          for (unsigned int e = 0; e < dim; ++e) {
+            reinterpret_cast<Lanes &>(affine[d * dim + e]) = C[d][e];
+            velocity[d] -= C[d][e] * (x[e] - cell[e].lower);
+          }
+      }
       const PointwiseWeights<dim, reach> w(lane_weights);
       for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk)
         for (unsigned int l = 0; l < batch.n; ++l) {
@@ -283,8 +300,8 @@ template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::deform_batch(
     Body<dim> &body, const Batch<double> &batch, const std::array<CellInterval, dim> &cell,
     const std::array<Lanes, dim> &x, const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
-    const double (*w)[Chunks::n_nodes], const double (*affine)[Chunks::n_nodes], const double dt,
-    const Divergences *cell_mean, StepFindings &findings)
+    const double (*w)[Chunks::n_nodes], const bool spin_only, const double dt, const Divergences *cell_mean,
+    StepFindings &findings)
 {
   const Layout &layout = body.layout();
   const Law &law = body.material().law();
@@ -293,6 +310,7 @@ void PointKernels<dim, reach, saturated>::deform_batch(
   std::array<Lanes, dim> velocity;
   GradientLanes du = {};
   Lanes divergence = broadcast(0.), speed_squared = broadcast(0.);
+  const double inverse_dt = 1. / dt;
   for (unsigned int d = 0; d < dim; ++d) {
     Lanes gradient[dim];
     interpolate<dim, reach>(v[d], weights, velocity[d], gradient);
@@ -300,13 +318,18 @@ void PointKernels<dim, reach, saturated>::deform_batch(
     divergence += gradient[d];
     for (unsigned int e = 0; e < dim; ++e)
       du[3 * d + e] = dt * gradient[e];
-    if (affine) {
-      Lanes value;
-      interpolate<dim, reach>(affine[d], weights, value, gradient);
-    }
-    if (layout.velocity_gradient >= 0)
+  }
+
+  if (layout.velocity_gradient >= 0) {
+    Lanes C[dim][dim];
+    for (unsigned int d = 0; d < dim; ++d)
       for (unsigned int e = 0; e < dim; ++e)
-        batch.store(layout.velocity_gradient + d * dim + e, gradient[e]);
+        C[d][e] = du[3 * d + e] * inverse_dt;
+    if (spin_only)
+      keep_spin(C);
+    for (unsigned int d = 0; d < dim; ++d)
+      for (unsigned int e = 0; e < dim; ++e)
+        batch.store(layout.velocity_gradient + d * dim + e, C[d][e]);
   }
 
   StressLanes stress = {};
@@ -398,20 +421,19 @@ void PointKernels<dim, reach, saturated>::filter_pressure(Body<dim> &body, const
 
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
-                                                 const double *v, const double *w, const AffineField &affine,
+                                                 const double *v, const double *w, const char *spin_only,
                                                  const double dt, const PressureUpdate &pressure,
                                                  StepFindings &findings) const
 {
   Batch<double> batch;
   std::array<Lanes, dim> x;
   Weights<dim, reach> weights;
-  alignas(64) double local_v[dim][Chunks::n_nodes], local_w[dim][Chunks::n_nodes],
-      local_affine[dim][Chunks::n_nodes];
+  alignas(64) double local_v[dim][Chunks::n_nodes], local_w[dim][Chunks::n_nodes];
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(v, cell_nodes, local_v);
-    const auto own_affine = gather_affine(body, affine, slice.cell, nodes, local_affine);
+    const bool spin = spin_only && spin_only[nodes.occupied_index(slice.cell)];
     const bool averaged = saturated && pressure.cell_means;
     Divergences mean{};
     if constexpr (saturated) {
@@ -422,8 +444,8 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, weights);
-      deform_batch(body, batch, cell, x, weights, local_v, local_w, own_affine, dt,
-                   averaged ? &mean : nullptr, findings);
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, spin, dt, averaged ? &mean : nullptr,
+                   findings);
     }
     if (saturated && pressure.filter > 0.)
       filter_pressure(body, slice, pressure.filter);
@@ -433,7 +455,7 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                              const double *a, const double *v,
-                                                             const double *w, const AffineField &affine,
+                                                             const double *w, const char *spin_only,
                                                              const VelocityUpdate &update,
                                                              const PressureUpdate &pressure,
                                                              StepFindings &findings) const
@@ -442,13 +464,13 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, co
   std::array<Lanes, dim> x, velocity;
   Weights<dim, reach> weights;
   alignas(64) double local_a[dim][Chunks::n_nodes], local_v[dim][Chunks::n_nodes],
-      local_w[dim][Chunks::n_nodes], local_affine[dim][Chunks::n_nodes];
+      local_w[dim][Chunks::n_nodes];
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(a, cell_nodes, local_a);
     gather(v, cell_nodes, local_v);
-    const auto own_affine = gather_affine(body, affine, slice.cell, nodes, local_affine);
+    const bool spin = spin_only && spin_only[nodes.occupied_index(slice.cell)];
     const bool averaged = saturated && pressure.cell_means;
     Divergences mean{};
     if constexpr (saturated) {
@@ -460,7 +482,7 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, co
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, weights);
       advance(body, batch, weights, local_a, local_v, update, velocity);
-      deform_batch(body, batch, cell, x, weights, local_v, local_w, own_affine, update.dt,
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, spin, update.dt,
                    averaged ? &mean : nullptr, findings);
     }
     if (saturated && pressure.filter > 0.)

@@ -13,13 +13,13 @@ public:
   void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const PressureUpdate &pressure,
                double *sums, const unsigned int stride) const override;
   void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
-                         const AffineField &affine, const VelocityUpdate &update,
+                         const char *spin_only, const VelocityUpdate &update,
                          double *momentum) const override;
   void deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *v, const double *w,
-              const AffineField &affine, const double dt, const PressureUpdate &pressure,
+              const char *spin_only, const double dt, const PressureUpdate &pressure,
               StepFindings &findings) const override;
   void advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
-                          const double *w, const AffineField &affine, const VelocityUpdate &update,
+                          const double *w, const char *spin_only, const VelocityUpdate &update,
                           const PressureUpdate &pressure, StepFindings &findings) const override;
 
 private:
@@ -90,17 +90,20 @@ private:
         local[c][i] = field[std::size_t(cell_nodes[i]) * n_components + c];
   }
 
-  /// Nodal values of the affine field if it differs from the carrying one in this cell, else nullptr.
-  static const double (*gather_affine(const Body<dim> &body, const AffineField &affine, const CellId cell,
-                                      const ActiveNodes<dim> &nodes,
-                                      double (*local)[Chunks::n_nodes]))[Chunks::n_nodes]
+  /// Velocity gradient without its symmetric part.
+  static void keep_spin(Lanes (*C)[dim])
   {
-    if (body.layout().velocity_gradient < 0 || !affine.velocity ||
-        !affine.differs[nodes.occupied_index(cell)])
-      return nullptr;
-    gather(affine.velocity, nodes.cell_nodes(cell), local);
-    return local;
+    for (unsigned int d = 0; d < dim; ++d)
+      for (unsigned int e = 0; e <= d; ++e) {
+        const Lanes rate = 0.5 * (C[d][e] - C[e][d]);
+        C[d][e] = rate;
+        C[e][d] = -rate;
+      }
   }
+
+  template <bool affine>
+  static void scatter_points(const Body<dim> &body, const ActiveNodes<dim> &nodes,
+                             const PressureUpdate &pressure, double *sums, const unsigned int stride);
 
   static void advance(const Body<dim> &body, const Batch<double> &batch, const Weights<dim, reach> &w,
                       const double (*a)[Chunks::n_nodes], const double (*v)[Chunks::n_nodes],
@@ -116,8 +119,8 @@ private:
   static void deform_batch(Body<dim> &body, const Batch<double> &batch,
                            const std::array<CellInterval, dim> &cell, const std::array<Lanes, dim> &x,
                            const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
-                           const double (*w)[Chunks::n_nodes], const double (*affine)[Chunks::n_nodes],
-                           const double dt, const Divergences *cell_mean, StepFindings &findings);
+                           const double (*w)[Chunks::n_nodes], const bool spin_only, const double dt,
+                           const Divergences *cell_mean, StepFindings &findings);
 
   /// Volume-weighted means over the points of a cell, the same in all lanes.
   static Divergences mean_divergences(const Body<dim> &body, const Slice &slice,

@@ -87,7 +87,6 @@ private:
   void find_small_nodes();
   /// Half of the cells of the mesh on either side, in every direction [m^dim].
   double node_volume(std::size_t node) const;
-  void find_affine_velocity();
   dealii::Tensor<1, dim> total_momentum() const;
   PressureUpdate pressure_update(std::size_t body) const;
   const Surface<dim> &surface(const Condition<dim> &condition) const;
@@ -104,15 +103,8 @@ private:
   NodalFields<dim> nodal;
   /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
   std::vector<double> carrying_velocity;
-  /// What points take the gradient of their velocity from, see find_affine_velocity().
-  std::vector<double> affine_velocity;
-  struct SmallNode
-  {
-    std::uint32_t node;
-    double mass; ///< below which it is small [kg]
-  };
-  std::vector<SmallNode> small_nodes;
-  std::vector<char> near_small_node; ///< by ActiveNodes::occupied_index()
+  /// Cells with a node of little mass in reach, by ActiveNodes::occupied_index().
+  std::vector<char> near_small_node;
   unsigned int steps_to_small_nodes = 0;
   /// Nodes and components on impermeable faces of the mesh.
   std::vector<std::size_t> closed_rows;

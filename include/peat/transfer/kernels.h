@@ -40,14 +40,6 @@ struct VelocityUpdate
   double retention;
 };
 
-/// The velocity field whose gradient points keep in affine transfers, and where it differs from the one that
-/// they move with.
-struct AffineField
-{
-  const double *velocity;
-  const char *differs; ///< by ActiveNodes::occupied_index() of the cell
-};
-
 /// How a step treats the pore pressure.
 struct PressureUpdate
 {
@@ -62,6 +54,10 @@ struct PressureUpdate
 
 /// The visits of the points of a body in a step, cell by cell. Members differ by basis, and by whether there
 /// is pore fluid; which one serves a body is decided once.
+///
+/// Where points keep the gradient C of their velocity (affine transfers), it is the gradient of the velocity
+/// that they move with, and in cells with a flag in `spin_only` (by ActiveNodes::occupied_index()) its skew
+/// part alone.
 ///
 /// Nodal arrays have one row per active node: `sums` with `stride` columns as in Sums, all others with dim
 /// columns.
@@ -81,17 +77,17 @@ public:
   /// Points' velocities from the nodes' acceleration `a` and new velocity `v` (modified-update-stress-last:
   /// and their momentum back to the nodes, columns of `momentum`).
   virtual void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a,
-                                 const double *v, const AffineField &affine, const VelocityUpdate &update,
+                                 const double *v, const char *spin_only, const VelocityUpdate &update,
                                  double *momentum) const = 0;
 
   /// Strain, stress, pressure, volume and position from the nodal velocity v and the nodal flux w = kappa R.
   virtual void deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *v, const double *w,
-                      const AffineField &affine, double dt, const PressureUpdate &pressure,
+                      const char *spin_only, double dt, const PressureUpdate &pressure,
                       StepFindings &findings) const = 0;
 
   /// Both of the above in one visit, without the way back to the nodes (update-stress-last).
   virtual void advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a,
-                                  const double *v, const double *w, const AffineField &affine,
+                                  const double *v, const double *w, const char *spin_only,
                                   const VelocityUpdate &update, const PressureUpdate &pressure,
                                   StepFindings &findings) const = 0;
 };
