@@ -90,9 +90,28 @@ void ExplicitMPM<dim>::resize_fields()
   if (has_loads)
     nodal.force.assign(n * dim, 0.);
   if (saturated) {
-    nodal.flux.assign(n * dim, 0.);
+    renumber_flux();
     nodal.pressure_load.assign(n * dim, 0.);
   }
+}
+
+template <int dim>
+void ExplicitMPM<dim>::renumber_flux()
+{
+  // Steps find the flux anew; this is for pictures between the steps. Another rank may know a node that is
+  // new here: its value comes with a count.
+  constexpr unsigned int n = dim + 1;
+  std::vector<double> known(active.size() * n, 0.);
+  for (std::size_t i = 0; i < active.size(); ++i)
+    if (const std::uint32_t old = active.previous_index(i); old != no_index && !nodal.flux.empty()) {
+      std::copy_n(&nodal.flux[std::size_t(old) * dim], dim, &known[i * n]);
+      known[i * n + dim] = 1.;
+    }
+  active.sum_over_ranks(known.data(), n);
+  nodal.flux.assign(active.size() * dim, 0.);
+  for (std::size_t i = 0; i < active.size(); ++i)
+    for (unsigned int d = 0; d < dim; ++d)
+      nodal.flux[i * dim + d] = known[i * n + d] / std::max(1., known[i * n + dim]);
 }
 
 template <int dim>

@@ -130,6 +130,8 @@ void PointKernels<dim, reach, saturated>::scatter_points(const Body<dim> &body, 
         for (unsigned int c = 0; c < n_sums; ++c)
           sum[c] = local[c][chunk];
         for (unsigned int l = 0; l < batch.n; ++l) {
+          if (Chunks::is_out_of_reach(w, l, chunk))
+            continue;
           const ShapeAtNodes<dim, reach> shape(w, l, chunk);
           sum[S::mass] += m[l] * shape.N;
           if constexpr (affine)

@@ -84,6 +84,7 @@ private:
   void relocate_points();
 
   void resize_fields();
+  void renumber_flux();
   void find_small_nodes();
   /// Half of the cells of the mesh on either side, in every direction [m^dim].
   double node_volume(std::size_t node) const;
