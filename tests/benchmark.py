@@ -61,7 +61,7 @@ def main():
                                                         "bytes/point", "bytes/point-step", "of copy"))
     for case in "block_dry", "block_saturated":
         for basis, update in ("q1", "usl"), ("q1", "musl"), ("gimp", "usl"):
-            for transfer in ("flip", "dflip") if update == "usl" else ("flip",):
+            for transfer in ("aflip", "flip"):
                 results = [run(arguments.peat, case, ["Explicit MPM/Basis=" + basis, "Explicit MPM/Transfer=" + transfer,
                                                       "Explicit MPM/Stress update=" + update])
                            for _ in range(arguments.repeat)]

@@ -16,15 +16,22 @@ void require_mesh(const Section &section, const Place<dim> &place)
                  "this kind of condition acts on faces of the mesh or a region, not on a body's surface");
 }
 
-template <int dim>
-class Fixed : public Condition<dim>
+/// Nodes that stand still: in all components, or in the one normal to their face of the mesh.
+template <int dim, bool normal_only>
+class Standing : public Condition<dim>
 {
 public:
-  Fixed(const Section &section, const Place<dim> &place) : Condition<dim>(section, place)
+  Standing(const Section &section, const Place<dim> &place) : Condition<dim>(section, place)
   {
     require_mesh(section, place);
+    if (normal_only && place.boundaries.empty() && !section.describing())
+      section.fail("Where",
+                   "a roller needs faces of the mesh; use 'velocity' with 'Components' for a region");
   }
-  bool prescribes(unsigned int, unsigned int) const override { return true; }
+  bool prescribes(const unsigned int boundary, const unsigned int component) const override
+  {
+    return !normal_only || component == boundary / 2;
+  }
   void constrain_motion(const ActiveNodes<dim> &, NodalFields<dim> &fields) const override
   {
     for (auto *field : {&fields.velocity, &fields.acceleration, &fields.new_velocity})
@@ -42,45 +49,15 @@ private:
     for (const auto &selection : this->selections)
       for (const std::uint32_t i : selection.nodes)
         for (unsigned int d = 0; d < dim; ++d)
-          field[std::size_t(i) * dim + d] = 0.;
+          if (!normal_only || int(d) == selection.boundary / 2)
+            field[std::size_t(i) * dim + d] = 0.;
   }
 };
-const ConditionMember<Fixed> fixed("fixed", "no motion.");
-
 template <int dim>
-class Roller : public Condition<dim>
-{
-public:
-  Roller(const Section &section, const Place<dim> &place) : Condition<dim>(section, place)
-  {
-    require_mesh(section, place);
-    if (place.boundaries.empty() && !section.describing())
-      section.fail("Where",
-                   "a roller needs faces of the mesh; use 'velocity' with 'Components' for a region");
-  }
-  bool prescribes(const unsigned int boundary, const unsigned int component) const override
-  {
-    return component == boundary / 2;
-  }
-  void constrain_motion(const ActiveNodes<dim> &, NodalFields<dim> &fields) const override
-  {
-    for (auto *field : {&fields.velocity, &fields.acceleration, &fields.new_velocity})
-      clear(*field);
-  }
-  void constrain_velocity(const ActiveNodes<dim> &, double, double,
-                          std::vector<double> &velocity) const override
-  {
-    clear(velocity);
-  }
-
-private:
-  void clear(std::vector<double> &field) const
-  {
-    for (const auto &selection : this->selections)
-      for (const std::uint32_t i : selection.nodes)
-        field[std::size_t(i) * dim + selection.boundary / 2] = 0.;
-  }
-};
+using Fixed = Standing<dim, false>;
+template <int dim>
+using Roller = Standing<dim, true>;
+const ConditionMember<Fixed> fixed("fixed", "no motion.");
 const ConditionMember<Roller> roller("roller", "no motion normal to the face.");
 
 /// What prescribed velocity and displacement share: which components, and a velocity per node and time.

@@ -80,6 +80,17 @@ void fill_row(std::vector<double> &row, const Layout &layout, const Material &ma
   row[layout.volume] = part.volume;
   for (unsigned int d = 0; d < dim; ++d)
     row[layout.velocity + d] = parameters.initial_velocity.value(x, 0., d);
+  if (layout.velocity_gradient >= 0)
+    for (unsigned int e = 0; e < dim; ++e) {
+      // Exact for velocities that are linear in place, but for round-off.
+      double below[3] = {x[0], x[1], x[2]}, above[3] = {x[0], x[1], x[2]};
+      below[e] -= half_extent[e];
+      above[e] += half_extent[e];
+      for (unsigned int d = 0; d < dim; ++d)
+        row[layout.velocity_gradient + d * dim + e] = (parameters.initial_velocity.value(above, 0., d) -
+                                                       parameters.initial_velocity.value(below, 0., d)) /
+                                                      (2. * half_extent[e]);
+    }
   for (unsigned int c = 0; c < parameters.initial_stress.n_components(); ++c)
     row[layout.stress + c] = parameters.initial_stress.value(x, 0., c);
   if (layout.pressure >= 0)

@@ -8,6 +8,8 @@ Layout::Layout(const unsigned int dim, const Material &material, const SchemeFie
   mass = add("mass", "kg", 1, Kind::scalar);
   volume = add("volume", dim == 2 ? "m^2" : "m^3", 1, Kind::scalar);
   velocity = add("velocity", "m/s", dim, Kind::vector);
+  if (scheme.velocity_gradient)
+    velocity_gradient = add("velocity gradient", "1/s", dim * dim, Kind::other);
   displacement = add("displacement", "m", dim, Kind::vector);
   stress = add("effective stress", "Pa", dim == 2 ? 4 : 6, Kind::stress);
   if (material.mixture()) {

@@ -23,7 +23,7 @@ ExplicitMPM<dim>::ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &g
                                      grid.smallest_cell_size()
                                : 0.);
   }
-  nodal.n_sums = Sums<dim>::full_momentum(saturated) + (scheme.nodes_keep_velocity ? dim : 0);
+  nodal.n_sums = Sums<dim>::n_columns(saturated);
 }
 
 template <int dim>
@@ -37,9 +37,7 @@ void ExplicitMPM<dim>::prepare()
   occupied.erase(std::unique(occupied.begin(), occupied.end()), occupied.end());
   active.rebuild(occupied);
   resize_fields();
-  if (scheme.nodes_keep_velocity)
-    renumber_kept_velocity();
-  steps_to_reference_masses = 0;
+  steps_to_small_nodes = 0;
 
   std::vector<bool> open(2 * dim, false);
   for (const auto &condition : scene.conditions) {
@@ -65,27 +63,28 @@ void ExplicitMPM<dim>::resize_fields()
   if (has_loads)
     nodal.force.assign(n * dim, 0.);
   if (saturated) {
-    nodal.flux.assign(n * dim, 0.);
+    renumber_flux();
     nodal.pressure_load.assign(n * dim, 0.);
   }
 }
 
 template <int dim>
-void ExplicitMPM<dim>::renumber_kept_velocity()
+void ExplicitMPM<dim>::renumber_flux()
 {
-  // Another rank may know what a node had that is new here.
+  // Steps find the flux anew; this is for pictures between the steps. Another rank may know a node that is
+  // new here: its value comes with a count.
   constexpr unsigned int n = dim + 1;
-  std::vector<double> kept(active.size() * n, 0.);
+  std::vector<double> known(active.size() * n, 0.);
   for (std::size_t i = 0; i < active.size(); ++i)
-    if (const std::uint32_t old = active.previous_index(i); old != no_index && !kept_velocity.empty())
-      std::copy_n(&kept_velocity[std::size_t(old) * n], n, &kept[i * n]);
-  active.sum_over_ranks(kept.data(), n);
+    if (const std::uint32_t old = active.previous_index(i); old != no_index && !nodal.flux.empty()) {
+      std::copy_n(&nodal.flux[std::size_t(old) * dim], dim, &known[i * n]);
+      known[i * n + dim] = 1.;
+    }
+  active.sum_over_ranks(known.data(), n);
+  nodal.flux.assign(active.size() * dim, 0.);
   for (std::size_t i = 0; i < active.size(); ++i)
-    for (unsigned int d = 0; d < n; ++d)
-      kept[i * n + d] /= std::max(1., kept[i * n + dim]);
-  for (std::size_t i = 0; i < active.size(); ++i)
-    kept[i * n + dim] = kept[i * n + dim] > 0. ? 1. : 0.;
-  kept_velocity.swap(kept);
+    for (unsigned int d = 0; d < dim; ++d)
+      nodal.flux[i * dim + d] = known[i * n + d] / std::max(1., known[i * n + dim]);
 }
 
 template <int dim>
@@ -102,12 +101,13 @@ double ExplicitMPM<dim>::node_volume(const std::size_t node) const
 }
 
 template <int dim>
-void ExplicitMPM<dim>::find_reference_masses()
+void ExplicitMPM<dim>::find_small_nodes()
 {
-  if (steps_to_reference_masses-- > 0)
+  if (steps_to_small_nodes-- > 0)
     return;
-  steps_to_reference_masses = 100;
-  reference_mass.assign(active.size(), 0.);
+  steps_to_small_nodes = 100;
+  // Mass that a node would have if it were as densely filled as the fullest node of its cells.
+  std::vector<double> full_mass(active.size(), 0.);
   for (const CellId cell : active.occupied_cells()) {
     const std::uint32_t *cell_nodes = active.cell_nodes(cell);
     // By mass per volume of the mesh around a node, so that nodes on the mesh's faces are as heavy as others.
@@ -117,17 +117,22 @@ void ExplicitMPM<dim>::find_reference_masses()
       densest = std::max(densest, nodal.sums[std::size_t(i) * nodal.n_sums] / node_volume(i));
     }
     for (unsigned int i = 0; i < active.nodes_per_cell(); ++i)
-      reference_mass[cell_nodes[i]] =
-          std::max(reference_mass[cell_nodes[i]], densest * node_volume(cell_nodes[i]));
+      full_mass[cell_nodes[i]] = std::max(full_mass[cell_nodes[i]], densest * node_volume(cell_nodes[i]));
   }
-  active.max_over_ranks(reference_mass.data(), 1);
-}
+  active.max_over_ranks(full_mass.data(), 1);
 
-template <int dim>
-bool ExplicitMPM<dim>::is_small(const std::size_t node) const
-{
-  // Nodes on a face of a body that fills its cells have half of it, those on its edges and corners less.
-  return nodal.sums[node * nodal.n_sums + Sums<dim>::mass] < 0.4 * reference_mass[node];
+  // Of a body that fills its cells a node on a face has half of it, one on an edge or corner an eighth at
+  // least.
+  constexpr double small_share = 0.1;
+  std::vector<char> small(active.size(), 0);
+  for (std::size_t i = 0; i < active.size(); ++i)
+    small[i] = nodal.sums[i * nodal.n_sums + Sums<dim>::mass] < small_share * full_mass[i];
+  near_small_node.assign(active.occupied_cells().size(), 0);
+  for (std::size_t c = 0; c < near_small_node.size(); ++c) {
+    const std::uint32_t *cell_nodes = active.cell_nodes(active.occupied_cells()[c]);
+    for (unsigned int i = 0; i < active.nodes_per_cell(); ++i)
+      near_small_node[c] |= small[cell_nodes[i]];
+  }
 }
 
 template <int dim>
@@ -153,8 +158,7 @@ void ExplicitMPM<dim>::points_to_nodes()
 {
   std::fill(nodal.sums.begin(), nodal.sums.end(), 0.);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    kernels[b]->scatter(*scene.bodies[b], active, scheme.nodes_keep_velocity ? kept_velocity.data() : nullptr,
-                        pressure_update(b), nodal.sums.data(), nodal.n_sums);
+    kernels[b]->scatter(*scene.bodies[b], active, pressure_update(b), nodal.sums.data(), nodal.n_sums);
   active.sum_over_ranks(nodal.sums.data(), nodal.n_sums);
 }
 
@@ -196,41 +200,11 @@ template <int dim>
 void ExplicitMPM<dim>::find_velocities()
 {
   using S = Sums<dim>;
-  if (scheme.nodes_keep_velocity)
-    find_reference_masses();
   for (std::size_t i = 0; i < active.size(); ++i) {
     const double *sum = &nodal.sums[i * nodal.n_sums];
     const double inverse = sum[S::mass] > 0. ? 1. / sum[S::mass] : 0.;
-    // A node with little mass may have had a large acceleration: it takes its velocity from the points alone.
-    const bool keeps = scheme.nodes_keep_velocity && kept_velocity[i * (dim + 1) + dim] > 0. && !is_small(i);
-    const double *momentum =
-        sum + (scheme.nodes_keep_velocity && !keeps ? S::full_momentum(saturated) : S::momentum);
     for (unsigned int d = 0; d < dim; ++d)
-      nodal.velocity[i * dim + d] = momentum[d] * inverse + (keeps ? kept_velocity[i * (dim + 1) + d] : 0.);
-  }
-}
-
-template <int dim>
-void ExplicitMPM<dim>::keep_velocities()
-{
-  // What nodes keep is exact while points stay where they are in their cells. It fades with the way they go,
-  // to what the points alone would give: a share exp(-20) is left after a cell. Without this, and with more
-  // nodes that keep their velocity, a turning block gains energy (S5, rigid motion).
-  const double fading = 20. * nodal.dt / grid.smallest_cell_size();
-  for (std::size_t i = 0; i < active.size(); ++i) {
-    const double *sum = &nodal.sums[i * nodal.n_sums];
-    const double *momentum = sum + Sums<dim>::full_momentum(saturated);
-    const double inverse = sum[Sums<dim>::mass] > 0. ? 1. / sum[Sums<dim>::mass] : 0.;
-    double speed = 0.;
-    for (unsigned int d = 0; d < dim; ++d)
-      speed += std::abs(nodal.velocity[i * dim + d]);
-    const double share = std::exp(-fading * speed);
-    double *kept = &kept_velocity[i * (dim + 1)];
-    kept[dim] = is_small(i) || sum[Sums<dim>::mass] == 0. ? 0. : 1.;
-    for (unsigned int d = 0; d < dim; ++d) {
-      const double from_points = momentum[d] * inverse;
-      kept[d] = kept[dim] * (from_points + share * (nodal.new_velocity[i * dim + d] - from_points));
-    }
+      nodal.velocity[i * dim + d] = sum[S::momentum + d] * inverse;
   }
 }
 
@@ -308,16 +282,21 @@ void ExplicitMPM<dim>::nodes_to_points()
   findings = {};
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
   const double *v = nodal.new_velocity.data(), *a = nodal.acceleration.data(), *w = nodal.flux.data();
-  if (scheme.nodes_keep_velocity)
-    keep_velocities();
+  // A node with little mass has large accelerations. A point that it reaches feels them by the node's weight,
+  // but the gradient of its velocity would feel them in full, and bring them back to the node.
+  if (scheme.affine)
+    find_small_nodes();
+  const char *spin_only = scheme.affine ? near_small_node.data() : nullptr;
   if (scheme.stress_update == SchemeParameters::StressUpdate::last) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-      kernels[b]->advance_and_deform(*scene.bodies[b], active, a, v, w, update, pressure_update(b), findings);
+      kernels[b]->advance_and_deform(*scene.bodies[b], active, a, v, w, spin_only, update, pressure_update(b),
+                                     findings);
     return;
   }
   std::fill(carrying_velocity.begin(), carrying_velocity.end(), 0.);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    kernels[b]->advance_and_remap(*scene.bodies[b], active, a, v, update, carrying_velocity.data());
+    kernels[b]->advance_and_remap(*scene.bodies[b], active, a, v, spin_only, update,
+                                  carrying_velocity.data());
   active.sum_over_ranks(carrying_velocity.data(), dim);
   for (std::size_t i = 0; i < active.size(); ++i) {
     const double m = nodal.sums[i * nodal.n_sums + Sums<dim>::mass];
@@ -327,8 +306,8 @@ void ExplicitMPM<dim>::nodes_to_points()
   for (const auto &condition : scene.conditions)
     condition->constrain_velocity(active, now + nodal.dt, nodal.dt, carrying_velocity);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    kernels[b]->deform(*scene.bodies[b], active, carrying_velocity.data(), w, nodal.dt, pressure_update(b),
-                       findings);
+    kernels[b]->deform(*scene.bodies[b], active, carrying_velocity.data(), w, spin_only, nodal.dt,
+                       pressure_update(b), findings);
 }
 
 template <int dim>

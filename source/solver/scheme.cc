@@ -5,18 +5,18 @@
 namespace peat {
 SchemeParameters::SchemeParameters(Section section)
 {
-  std::string basis_name = "gimp", transfer = "flip", update = "auto";
+  std::string basis_name = "gimp", transfer = "aflip", update = "auto";
   section.add(
       "Basis", basis_name, {"q1", "gimp"},
       "Shape functions of the points. 'q1': FE_Q(1), cheapest, for points that stay in their cells. 'gimp': "
       "FE_Q(1) averaged over the point's domain, ten to a hundred times less noise when points cross faces.");
   section.add(
-      "Transfer", transfer, {"dflip", "flip", "pic"},
-      "How velocities go from points to nodes and back. 'flip': points add the grid's acceleration. 'dflip': "
-      "the "
-      "same, but nodes keep their velocity and take up only how the points differ from it, which removes the "
-      "dispersion of FLIP: for waves of small amplitude, not for bodies that fly or turn. 'pic': points take "
-      "the grid's velocity; damps strongly.");
+      "Transfer", transfer, {"aflip", "flip", "pic"},
+      "How velocities go from points to nodes and back. 'aflip': points add the grid's acceleration, and "
+      "bring "
+      "their velocity to the nodes together with its gradient; keeps rotation and waves. 'flip': without the "
+      "gradient, which smooths waves and lets small bodies lose their spin. 'pic': points take the grid's "
+      "velocity; damps strongly.");
   section.add("Stress update", update, {"auto", "usl", "musl"},
               "When stresses follow the velocities. 'usl': from the nodes' new velocities, cheapest. 'musl': "
               "from the "
@@ -24,7 +24,7 @@ SchemeParameters::SchemeParameters(Section section)
               "body's first "
               "cells. 'auto': usl with gimp, musl with q1.");
   section.add("Relaxation time", relaxation_time, nonnegative("s"),
-              "Time in which the points' velocities relax to the grid's in 'flip' and 'dflip'; damps noise "
+              "Time in which the points' velocities relax to the grid's in 'aflip' and 'flip'; damps noise "
               "at a rate that "
               "does not depend on the step. 0: never.");
   section.add("Local damping", local_damping, between(0., 0.99),
@@ -44,7 +44,7 @@ SchemeParameters::SchemeParameters(Section section)
   section.add("Step factor", step_factor, strictly_between(0., 100.), "Step over the stable step.");
   section.add("Time step", fixed_step, nonnegative("s"), "A fixed step; 0 for the automatic one.");
   basis = basis_name == "q1" ? Basis::q1 : Basis::gimp;
-  nodes_keep_velocity = transfer == "dflip";
+  affine = transfer == "aflip";
   grid_velocity = transfer == "pic";
   stress_update = update == "usl" || (update == "auto" && basis == Basis::gimp) ? StressUpdate::last
                                                                                 : StressUpdate::modified_last;

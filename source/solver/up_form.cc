@@ -334,6 +334,12 @@ void PointForm<dim, reach>::update_points(Body<dim> &body, const TimeLevel &leve
         points.store(layout.velocity + d, v);
         check += v;
       }
+      if (layout.velocity_gradient >= 0) {
+        const GradientLanes L = points.gradient(values.end_velocity);
+        for (unsigned int d = 0; d < dim; ++d)
+          for (unsigned int e = 0; e < dim; ++e)
+            points.store(layout.velocity_gradient + d * dim + e, L[3 * d + e]);
+      }
       work.finite = work.finite && std::isfinite(sum(check));
       points.deform(body, at.gradient, values.U, move);
     }

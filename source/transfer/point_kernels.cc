@@ -47,13 +47,35 @@ double PointKernels<dim, reach, saturated>::mean_pressure(const Body<dim> &body,
 }
 
 template <int dim, unsigned int reach, bool saturated>
+void PointKernels<dim, reach, saturated>::node_offsets(const std::array<CellInterval, dim> &cell,
+                                                       NodeLanes (*offset)[Chunks::n])
+{
+  for (unsigned int d = 0; d < dim; ++d) {
+    const double at[4] = {-cell[d].size_below, 0., cell[d].size, cell[d].size + cell[d].size_above};
+    for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk)
+      offset[d][chunk] = Chunks::spread(reach == 4 ? at : at + 1, d, chunk);
+  }
+}
+
+template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes,
-                                                  const double *kept, const PressureUpdate &pressure,
-                                                  double *sums, const unsigned int stride) const
+                                                  const PressureUpdate &pressure, double *sums,
+                                                  const unsigned int stride) const
+{
+  if (body.layout().velocity_gradient >= 0)
+    scatter_points<true>(body, nodes, pressure, sums, stride);
+  else
+    scatter_points<false>(body, nodes, pressure, sums, stride);
+}
+
+template <int dim, unsigned int reach, bool saturated>
+template <bool affine>
+void PointKernels<dim, reach, saturated>::scatter_points(const Body<dim> &body, const ActiveNodes<dim> &nodes,
+                                                         const PressureUpdate &pressure, double *sums,
+                                                         const unsigned int stride)
 {
   using S = Sums<dim>;
-  constexpr unsigned int full = S::full_momentum(saturated), n_sums = full + dim;
-  const unsigned int n_used = kept ? n_sums : full;
+  constexpr unsigned int n_sums = S::n_columns(saturated);
   const Layout &layout = body.layout();
   const Mixture *mixture = body.material().mixture();
   const FluidLanes at_start = fluid_at_start(mixture);
@@ -62,15 +84,16 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
   std::array<Lanes, dim> x;
   Weights<dim, reach> lane_weights;
   // Per point: what the node vectors are multiplied with.
-  alignas(64) double momentum[2 * dim][n_lanes], total_stress[6][n_lanes], darcy[3][n_lanes];
-  alignas(64) double local_kept[dim + 1][Chunks::n_nodes];
+  alignas(64) double momentum[dim][n_lanes], total_stress[6][n_lanes], darcy[3][n_lanes];
+  alignas(64) double mC[dim * dim][n_lanes];
+  alignas(64) NodeLanes offset[dim][Chunks::n];
 
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
-    if (kept)
-      gather<dim + 1>(kept, cell_nodes, local_kept);
     alignas(64) NodeLanes local[n_sums][Chunks::n] = {};
+    if constexpr (affine)
+      node_offsets(cell, offset);
     const double mean_p = saturated && pressure.cell_means ? mean_pressure(body, slice) : 0.;
 
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
@@ -78,16 +101,15 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
       evaluate(body, batch, cell, x, lane_weights);
       const PointwiseWeights<dim, reach> w(lane_weights);
       const Lanes m = batch.load(layout.mass);
-      const Lanes keeping = kept ? interpolate<dim, reach>(local_kept[dim], lane_weights) : broadcast(1.);
-      for (unsigned int d = 0; d < dim; ++d) {
-        const Lanes v = batch.load(layout.velocity + d);
-        Lanes difference = v;
-        if (kept)
-          difference = keeping > 1e-3 ? v - interpolate<dim, reach>(local_kept[d], lane_weights) / keeping
-                                      : broadcast(0.);
-        reinterpret_cast<Lanes &>(momentum[d]) = m * difference;
-        reinterpret_cast<Lanes &>(momentum[dim + d]) = m * v;
-      }
+      for (unsigned int d = 0; d < dim; ++d)
+        reinterpret_cast<Lanes &>(momentum[d]) = m * batch.load(layout.velocity + d);
+      if constexpr (affine)
+        for (unsigned int d = 0; d < dim; ++d)
+          for (unsigned int e = 0; e < dim; ++e) {
+            const Lanes c = m * batch.load(layout.velocity_gradient + d * dim + e);
+            reinterpret_cast<Lanes &>(mC[d * dim + e]) = c;
+            reinterpret_cast<Lanes &>(momentum[d]) -= c * (x[e] - cell[e].lower);
+          }
       const Lanes V = batch.load(layout.volume);
       Lanes alpha_p = broadcast(0.);
       if constexpr (saturated) {
@@ -108,13 +130,20 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
         for (unsigned int c = 0; c < n_sums; ++c)
           sum[c] = local[c][chunk];
         for (unsigned int l = 0; l < batch.n; ++l) {
+          if (Chunks::is_out_of_reach(w, l, chunk))
+            continue;
           const ShapeAtNodes<dim, reach> shape(w, l, chunk);
           sum[S::mass] += m[l] * shape.N;
-          for (unsigned int d = 0; d < dim; ++d)
-            sum[S::momentum + d] += momentum[d][l] * shape.N;
-          if (kept)
+          if constexpr (affine)
+            for (unsigned int d = 0; d < dim; ++d) {
+              NodeLanes v = momentum[d][l] + mC[d * dim][l] * offset[0][chunk];
+              for (unsigned int e = 1; e < dim; ++e)
+                v += mC[d * dim + e][l] * offset[e][chunk];
+              sum[S::momentum + d] += v * shape.N;
+            }
+          else
             for (unsigned int d = 0; d < dim; ++d)
-              sum[full + d] += momentum[dim + d][l] * shape.N;
+              sum[S::momentum + d] += momentum[d][l] * shape.N;
           if constexpr (dim == 2) {
             sum[S::force] -= total_stress[0][l] * shape.dN[0] + total_stress[3][l] * shape.dN[1];
             sum[S::force + 1] -= total_stress[3][l] * shape.dN[0] + total_stress[1][l] * shape.dN[1];
@@ -140,7 +169,7 @@ void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const A
 
     for (unsigned int i = 0; i < Chunks::n_nodes; ++i) {
       double *out = sums + std::size_t(cell_nodes[i]) * stride;
-      for (unsigned int c = 0; c < n_used; ++c)
+      for (unsigned int c = 0; c < n_sums; ++c)
         out[c] += local[c][i / Chunks::width][i % Chunks::width];
     }
   }
@@ -169,6 +198,7 @@ void PointKernels<dim, reach, saturated>::advance(const Body<dim> &body, const B
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                             const double *a, const double *v,
+                                                            const char *spin_only,
                                                             const VelocityUpdate &update,
                                                             double *momentum) const
 {
@@ -177,24 +207,47 @@ void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, con
   std::array<Lanes, dim> x, velocity;
   Weights<dim, reach> lane_weights;
   alignas(64) double local_a[dim][Chunks::n_nodes], local_v[dim][Chunks::n_nodes];
+  alignas(64) double affine[dim * dim][n_lanes];
+  alignas(64) NodeLanes offset[dim][Chunks::n];
 
   for (const Slice &slice : body.slices()) {
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(a, cell_nodes, local_a);
     gather(v, cell_nodes, local_v);
+    const bool spin = spin_only && spin_only[nodes.occupied_index(slice.cell)];
+    node_offsets(cell, offset);
     alignas(64) NodeLanes local[dim][Chunks::n] = {};
 
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, lane_weights);
       advance(body, batch, lane_weights, local_a, local_v, update, velocity);
+      if (layout.velocity_gradient >= 0) {
+        Lanes C[dim][dim];
+        for (unsigned int d = 0; d < dim; ++d) {
+          Lanes value;
+          interpolate<dim, reach>(local_v[d], lane_weights, value, C[d]);
+        }
+        if (spin)
+          keep_spin(C);
+        for (unsigned int d = 0; d < dim; ++d)
+          for (unsigned int e = 0; e < dim; ++e) {
+            reinterpret_cast<Lanes &>(affine[d * dim + e]) = C[d][e];
+            velocity[d] -= C[d][e] * (x[e] - cell[e].lower);
+          }
+      }
       const PointwiseWeights<dim, reach> w(lane_weights);
       for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk)
         for (unsigned int l = 0; l < batch.n; ++l) {
           const NodeLanes mN = batch.row[l][layout.mass] * ShapeAtNodes<dim, reach>::value(w, l, chunk);
-          for (unsigned int d = 0; d < dim; ++d)
-            local[d][chunk] += mN * velocity[d][l];
+          for (unsigned int d = 0; d < dim; ++d) {
+            NodeLanes vd = velocity[d][l] + NodeLanes{};
+            if (layout.velocity_gradient >= 0)
+              for (unsigned int e = 0; e < dim; ++e)
+                vd += affine[d * dim + e][l] * offset[e][chunk];
+            local[d][chunk] += mN * vd;
+          }
         }
     }
     for (unsigned int i = 0; i < Chunks::n_nodes; ++i)
@@ -249,7 +302,8 @@ template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::deform_batch(
     Body<dim> &body, const Batch<double> &batch, const std::array<CellInterval, dim> &cell,
     const std::array<Lanes, dim> &x, const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
-    const double (*w)[Chunks::n_nodes], const double dt, const Divergences *cell_mean, StepFindings &findings)
+    const double (*w)[Chunks::n_nodes], const bool spin_only, const double dt, const Divergences *cell_mean,
+    StepFindings &findings)
 {
   const Layout &layout = body.layout();
   const Law &law = body.material().law();
@@ -258,6 +312,7 @@ void PointKernels<dim, reach, saturated>::deform_batch(
   std::array<Lanes, dim> velocity;
   GradientLanes du = {};
   Lanes divergence = broadcast(0.), speed_squared = broadcast(0.);
+  const double inverse_dt = 1. / dt;
   for (unsigned int d = 0; d < dim; ++d) {
     Lanes gradient[dim];
     interpolate<dim, reach>(v[d], weights, velocity[d], gradient);
@@ -265,6 +320,18 @@ void PointKernels<dim, reach, saturated>::deform_batch(
     divergence += gradient[d];
     for (unsigned int e = 0; e < dim; ++e)
       du[3 * d + e] = dt * gradient[e];
+  }
+
+  if (layout.velocity_gradient >= 0) {
+    Lanes C[dim][dim];
+    for (unsigned int d = 0; d < dim; ++d)
+      for (unsigned int e = 0; e < dim; ++e)
+        C[d][e] = du[3 * d + e] * inverse_dt;
+    if (spin_only)
+      keep_spin(C);
+    for (unsigned int d = 0; d < dim; ++d)
+      for (unsigned int e = 0; e < dim; ++e)
+        batch.store(layout.velocity_gradient + d * dim + e, C[d][e]);
   }
 
   StressLanes stress = {};
@@ -356,8 +423,9 @@ void PointKernels<dim, reach, saturated>::filter_pressure(Body<dim> &body, const
 
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
-                                                 const double *v, const double *w, const double dt,
-                                                 const PressureUpdate &pressure, StepFindings &findings) const
+                                                 const double *v, const double *w, const char *spin_only,
+                                                 const double dt, const PressureUpdate &pressure,
+                                                 StepFindings &findings) const
 {
   Batch<double> batch;
   std::array<Lanes, dim> x;
@@ -367,6 +435,7 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
     const auto cell = intervals(nodes, slice.cell);
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(v, cell_nodes, local_v);
+    const bool spin = spin_only && spin_only[nodes.occupied_index(slice.cell)];
     const bool averaged = saturated && pressure.cell_means;
     Divergences mean{};
     if constexpr (saturated) {
@@ -377,7 +446,8 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, weights);
-      deform_batch(body, batch, cell, x, weights, local_v, local_w, dt, averaged ? &mean : nullptr, findings);
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, spin, dt, averaged ? &mean : nullptr,
+                   findings);
     }
     if (saturated && pressure.filter > 0.)
       filter_pressure(body, slice, pressure.filter);
@@ -387,7 +457,8 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                              const double *a, const double *v,
-                                                             const double *w, const VelocityUpdate &update,
+                                                             const double *w, const char *spin_only,
+                                                             const VelocityUpdate &update,
                                                              const PressureUpdate &pressure,
                                                              StepFindings &findings) const
 {
@@ -401,6 +472,7 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, co
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(a, cell_nodes, local_a);
     gather(v, cell_nodes, local_v);
+    const bool spin = spin_only && spin_only[nodes.occupied_index(slice.cell)];
     const bool averaged = saturated && pressure.cell_means;
     Divergences mean{};
     if constexpr (saturated) {
@@ -412,8 +484,8 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, co
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, weights);
       advance(body, batch, weights, local_a, local_v, update, velocity);
-      deform_batch(body, batch, cell, x, weights, local_v, local_w, update.dt, averaged ? &mean : nullptr,
-                   findings);
+      deform_batch(body, batch, cell, x, weights, local_v, local_w, spin, update.dt,
+                   averaged ? &mean : nullptr, findings);
     }
     if (saturated && pressure.filter > 0.)
       filter_pressure(body, slice, pressure.filter);

@@ -10,15 +10,17 @@ template <int dim, unsigned int reach, bool saturated>
 class PointKernels : public Kernels<dim>
 {
 public:
-  void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const double *kept,
-               const PressureUpdate &pressure, double *sums, const unsigned int stride) const override;
+  void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const PressureUpdate &pressure,
+               double *sums, const unsigned int stride) const override;
   void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
-                         const VelocityUpdate &update, double *momentum) const override;
+                         const char *spin_only, const VelocityUpdate &update,
+                         double *momentum) const override;
   void deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *v, const double *w,
-              const double dt, const PressureUpdate &pressure, StepFindings &findings) const override;
+              const char *spin_only, const double dt, const PressureUpdate &pressure,
+              StepFindings &findings) const override;
   void advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
-                          const double *w, const VelocityUpdate &update, const PressureUpdate &pressure,
-                          StepFindings &findings) const override;
+                          const double *w, const char *spin_only, const VelocityUpdate &update,
+                          const PressureUpdate &pressure, StepFindings &findings) const override;
 
 private:
   using Chunks = NodeChunks<dim, reach>;
@@ -88,6 +90,21 @@ private:
         local[c][i] = field[std::size_t(cell_nodes[i]) * n_components + c];
   }
 
+  /// Velocity gradient without its symmetric part.
+  static void keep_spin(Lanes (*C)[dim])
+  {
+    for (unsigned int d = 0; d < dim; ++d)
+      for (unsigned int e = 0; e <= d; ++e) {
+        const Lanes rate = 0.5 * (C[d][e] - C[e][d]);
+        C[d][e] = rate;
+        C[e][d] = -rate;
+      }
+  }
+
+  template <bool affine>
+  static void scatter_points(const Body<dim> &body, const ActiveNodes<dim> &nodes,
+                             const PressureUpdate &pressure, double *sums, const unsigned int stride);
+
   static void advance(const Body<dim> &body, const Batch<double> &batch, const Weights<dim, reach> &w,
                       const double (*a)[Chunks::n_nodes], const double (*v)[Chunks::n_nodes],
                       const VelocityUpdate &update, std::array<Lanes, dim> &new_velocity);
@@ -102,8 +119,8 @@ private:
   static void deform_batch(Body<dim> &body, const Batch<double> &batch,
                            const std::array<CellInterval, dim> &cell, const std::array<Lanes, dim> &x,
                            const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
-                           const double (*w)[Chunks::n_nodes], const double dt, const Divergences *cell_mean,
-                           StepFindings &findings);
+                           const double (*w)[Chunks::n_nodes], const bool spin_only, const double dt,
+                           const Divergences *cell_mean, StepFindings &findings);
 
   /// Volume-weighted means over the points of a cell, the same in all lanes.
   static Divergences mean_divergences(const Body<dim> &body, const Slice &slice,
@@ -114,6 +131,9 @@ private:
   static Lanes volumes(const Layout &layout, const Batch<Row> &batch);
   static Lanes divergence_of(const Weights<dim, reach> &weights, const double (*field)[Chunks::n_nodes]);
   static double mean_pressure(const Body<dim> &body, const Slice &slice);
+
+  /// Places of the nodes that a cell's points reach, relative to the cell's lower corner.
+  static void node_offsets(const std::array<CellInterval, dim> &cell, NodeLanes (*offset)[Chunks::n]);
 
   static void filter_pressure(Body<dim> &body, const Slice &slice, const double share);
 };

@@ -29,6 +29,13 @@ struct NodeChunks
   static constexpr unsigned int n = n_nodes / width;
   using Vector = typename NodeVector<width>::type;
 
+  /// Whether a point's domain leaves out all nodes of a chunk: in 3-D a chunk is part of one layer of nodes.
+  template <typename PointwiseWeights>
+  static bool is_out_of_reach(const PointwiseWeights &w, const unsigned int point, const unsigned int chunk)
+  {
+    return dim == 3 && reach == 4 && w.value[dim - 1][point][chunk / 2] == 0.;
+  }
+
   /// The weights of one direction, spread over the nodes of a chunk.
   static Vector spread(const double *w, const unsigned int direction, const unsigned int chunk)
   {

@@ -33,6 +33,8 @@ public:
   }
   /// Whether points of this cell can be handled, i.e. the cell was occupied at the last rebuild.
   bool is_occupied(const CellId cell) const { return slot[cell] != no_index; }
+  /// Place of an occupied cell in occupied_cells().
+  std::uint32_t occupied_index(const CellId cell) const { return slot[cell]; }
   const std::vector<CellId> &occupied_cells() const { return cells; }
 
   const dealii::Point<dim> &position(const unsigned int i) const { return positions[i]; }

@@ -13,6 +13,7 @@ constexpr unsigned int max_state_columns = 32;
 struct SchemeFields
 {
   bool extent = false;
+  bool velocity_gradient = false;
   /// Put Gauss points, so many per direction, into full cells instead of evenly spaced points; 0: no.
   unsigned int gauss_points = 0;
 };
@@ -41,16 +42,17 @@ struct Layout
   unsigned int n_columns = 0;
   std::vector<Field> fields;
 
-  int mass = -1;            ///< [kg]
-  int volume = -1;          ///< [m^dim]; per metre of depth in 2-D
-  int velocity = -1;        ///< [m/s]
-  int displacement = -1;    ///< [m] since the start
-  int stress = -1;          ///< effective Cauchy stress [Pa]
-  int pressure = -1;        ///< pore pressure [Pa]; saturated bodies
-  int porosity = -1;        ///< [-]; saturated bodies under finite strain (constant otherwise)
-  int extent = -1;          ///< half the edge lengths of the point's domain [m]; GIMP
-  int state = -1;           ///< what the law remembers
-  unsigned int n_state = 0; ///< number of columns of the law's memory
+  int mass = -1;              ///< [kg]
+  int volume = -1;            ///< [m^dim]; per metre of depth in 2-D
+  int velocity = -1;          ///< [m/s]
+  int velocity_gradient = -1; ///< [1/s], row by row: dv_x/dx, dv_x/dy, ...; affine transfers
+  int displacement = -1;      ///< [m] since the start
+  int stress = -1;            ///< effective Cauchy stress [Pa]
+  int pressure = -1;          ///< pore pressure [Pa]; saturated bodies
+  int porosity = -1;          ///< [-]; saturated bodies under finite strain (constant otherwise)
+  int extent = -1;            ///< half the edge lengths of the point's domain [m]; GIMP
+  int state = -1;             ///< what the law remembers
+  unsigned int n_state = 0;   ///< number of columns of the law's memory
 
 private:
   int add(const std::string &name, const std::string &unit, unsigned int n_components, Kind kind);

@@ -51,12 +51,10 @@ private:
   void relocate_points();
 
   void resize_fields();
-  void renumber_kept_velocity();
-  void find_reference_masses();
+  void renumber_flux();
+  void find_small_nodes();
   /// Half of the cells of the mesh on either side, in every direction [m^dim].
   double node_volume(std::size_t node) const;
-  void keep_velocities();
-  bool is_small(std::size_t node) const;
   dealii::Tensor<1, dim> total_momentum() const;
   PressureUpdate pressure_update(std::size_t body) const;
   const Surface<dim> &surface(const Condition<dim> &condition) const;
@@ -73,12 +71,9 @@ private:
   NodalFields<dim> nodal;
   /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
   std::vector<double> carrying_velocity;
-  /// What nodes keep of their velocity from step to step, rows of dim + 1 as Kernels::scatter() takes them;
-  /// empty if nodes keep nothing.
-  std::vector<double> kept_velocity;
-  /// Mass that a node would have if it were as densely filled as the fullest node of its cells [kg].
-  std::vector<double> reference_mass;
-  unsigned int steps_to_reference_masses = 0;
+  /// Cells with a node of little mass in reach, by ActiveNodes::occupied_index().
+  std::vector<char> near_small_node;
+  unsigned int steps_to_small_nodes = 0;
   /// Nodes and components on impermeable faces of the mesh.
   std::vector<std::size_t> closed_rows;
   dealii::Tensor<1, dim> gravity_now;

@@ -22,6 +22,7 @@ struct SchemeParameters
   {
     SchemeFields fields;
     fields.extent = basis == Basis::gimp;
+    fields.velocity_gradient = affine;
     return fields;
   }
   /// Share of the points' own velocity that survives a step of length dt.
@@ -29,11 +30,10 @@ struct SchemeParameters
 
   Basis basis;
   StressUpdate stress_update;
-  bool nodes_keep_velocity;    ///< only the points' difference from the nodes' last velocity is mapped to the
-                               ///< nodes
-  bool grid_velocity;          ///< the points take the grid's velocity each step (PIC)
-  double relaxation_time = 0.; ///< of the points' velocity towards the grid's [s]; 0: never
-  double local_damping = 0.;   ///< share of the out-of-balance force that opposes the velocity
+  bool affine;                   ///< the points' velocity is mapped with its gradient
+  bool grid_velocity;            ///< the points take the grid's velocity each step (PIC)
+  double relaxation_time = 0.;   ///< of the points' velocity towards the grid's [s]; 0: never
+  double local_damping = 0.;     ///< share of the out-of-balance force that opposes the velocity
   bool pressure_of_cells = true; ///< pore pressure acts with its mean over the points of a cell
   double pressure_filter = 0.;   ///< rate of the filter in units of c_u / h
   double step_factor = 0.8;      ///< step over stable step

@@ -18,12 +18,8 @@ struct Sums
   static constexpr unsigned int fluid_inertia = n_dry + 1;  ///< sum N V rho_f [kg]
   static constexpr unsigned int pressure_force = n_dry + 2; ///< sum V p grad N [N]
   static constexpr unsigned int n_saturated = n_dry + 2 + dim;
-  /// With nodes that keep their velocity, dim more columns: sum N m v, while `momentum` is of the difference
-  /// only.
-  static constexpr unsigned int full_momentum(const bool saturated)
-  {
-    return saturated ? n_saturated : n_dry;
-  }
+  /// How many of them a scene uses.
+  static constexpr unsigned int n_columns(const bool saturated) { return saturated ? n_saturated : n_dry; }
 };
 
 /// What the points' visits of one step find, over this rank's points.
@@ -59,6 +55,10 @@ struct PressureUpdate
 /// The visits of the points of a body in a step, cell by cell. Members differ by basis, and by whether there
 /// is pore fluid; which one serves a body is decided once.
 ///
+/// Where points keep the gradient C of their velocity (affine transfers), it is the gradient of the velocity
+/// that they move with, and in cells with a flag in `spin_only` (by ActiveNodes::occupied_index()) its skew
+/// part alone.
+///
 /// Nodal arrays have one row per active node: `sums` with `stride` columns as in Sums, all others with dim
 /// columns.
 template <int dim>
@@ -69,25 +69,26 @@ public:
 
   static std::unique_ptr<Kernels> make(Basis basis, bool saturated);
 
-  /// Points to nodes: mass, momentum, internal force and, with pore fluid, the terms of Darcy's law. With
-  /// nodal velocities `kept`, momentum is that of the difference v_p - kept(x_p) only. `kept` has rows of dim
-  /// + 1: the velocity and 1, or zeros for a node that keeps none; what a point sees is the mean over the
-  /// nodes that do, by weight.
-  virtual void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const double *kept,
-                       const PressureUpdate &pressure, double *sums, unsigned int stride) const = 0;
+  /// Points to nodes: mass, momentum, internal force and, with pore fluid, the terms of Darcy's law. Points
+  /// that keep the gradient C of their velocity bring v_p + C (x_I - x_p) to node I.
+  virtual void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const PressureUpdate &pressure,
+                       double *sums, unsigned int stride) const = 0;
 
   /// Points' velocities from the nodes' acceleration `a` and new velocity `v` (modified-update-stress-last:
   /// and their momentum back to the nodes, columns of `momentum`).
   virtual void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a,
-                                 const double *v, const VelocityUpdate &update, double *momentum) const = 0;
+                                 const double *v, const char *spin_only, const VelocityUpdate &update,
+                                 double *momentum) const = 0;
 
   /// Strain, stress, pressure, volume and position from the nodal velocity v and the nodal flux w = kappa R.
   virtual void deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *v, const double *w,
-                      double dt, const PressureUpdate &pressure, StepFindings &findings) const = 0;
+                      const char *spin_only, double dt, const PressureUpdate &pressure,
+                      StepFindings &findings) const = 0;
 
   /// Both of the above in one visit, without the way back to the nodes (update-stress-last).
   virtual void advance_and_deform(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a,
-                                  const double *v, const double *w, const VelocityUpdate &update,
-                                  const PressureUpdate &pressure, StepFindings &findings) const = 0;
+                                  const double *v, const double *w, const char *spin_only,
+                                  const VelocityUpdate &update, const PressureUpdate &pressure,
+                                  StepFindings &findings) const = 0;
 };
 } // namespace peat
