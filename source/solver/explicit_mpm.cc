@@ -130,8 +130,8 @@ void ExplicitMPM<dim>::find_small_nodes()
   near_small_node.assign(active.occupied_cells().size(), 0);
   for (std::size_t c = 0; c < near_small_node.size(); ++c) {
     const std::uint32_t *cell_nodes = active.cell_nodes(active.occupied_cells()[c]);
-    for (unsigned int i = 0; i < active.nodes_per_cell(); ++i)
-      near_small_node[c] |= small[cell_nodes[i]];
+    for (unsigned int v = 0; v < (1u << dim); ++v)
+      near_small_node[c] |= small[cell_nodes[active.own_node(v)]];
   }
 }
 

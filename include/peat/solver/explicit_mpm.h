@@ -71,7 +71,7 @@ private:
   NodalFields<dim> nodal;
   /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
   std::vector<double> carrying_velocity;
-  /// Cells with a node of little mass in reach, by ActiveNodes::occupied_index().
+  /// Cells that have a node of little mass, by ActiveNodes::occupied_index().
   std::vector<char> near_small_node;
   unsigned int steps_to_small_nodes = 0;
   /// Nodes and components on impermeable faces of the mesh.
