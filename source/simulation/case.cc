@@ -16,7 +16,8 @@ StageParameters::StageParameters(Section section) : name(section.name())
   solver = solver_name == "static"         ? Solver::static_state
            : solver_name == "quasi-static" ? Solver::quasi_static
                                            : Solver::dynamic;
-  section.add("Duration", duration, nonnegative("s"), "How long the stage lasts; a static one takes no time.");
+  if (solver != Solver::static_state || section.describing())
+    section.add("Duration", duration, positive("s"), "How long the stage lasts; a static one takes no time.");
   std::string state_name = "points";
   section.add("Static state", state_name, {"points", "fem"},
               "Of a static stage with material points. 'points': on the points' own quadrature, so that an "
@@ -38,8 +39,10 @@ StageParameters::StageParameters(Section section) : name(section.name())
     return;
   if (solver != Solver::static_state)
     section.require("Duration", "stage '" + name + "'");
-  if (solver == Solver::static_state ? duration > 0. : duration == 0.)
-    section.fail("Duration", solver == Solver::static_state ? "a static stage takes no time" : "must be > 0 s");
+  if (solver == Solver::static_state && section.has("Duration"))
+    section.fail("Duration", "a static stage takes no time");
+  if (solver == Solver::static_state)
+    duration = 0.;
 }
 
 unsigned int read_dimension(const ParameterFile &file)

@@ -28,7 +28,7 @@ struct StageParameters
 
   std::string name;
   Solver solver = Solver::dynamic;
-  double duration = 0.; ///< [s]
+  double duration = 1.; ///< [s]; 0 of a static stage
   bool reset_displacements = false;
   bool static_on_points = true; ///< of material points: else on the finite element mesh
   double K0 = 0.;               ///< static: horizontal over vertical effective stress; 0: from elasticity
