@@ -2,9 +2,6 @@
 
 #include <peat/base/error.h>
 
-#include <deal.II/lac/solver_control.h>
-#include <deal.II/lac/solver_gmres.h>
-
 #include <EpetraExt_MatrixMatrix.h>
 #include <Epetra_Import.h>
 #include <Teuchos_ParameterList.hpp>
@@ -13,6 +10,9 @@
 #include <cmath>
 
 namespace peat {
+using BlockMatrix = LinearSolver::BlockMatrix;
+using BlockVector = LinearSolver::BlockVector;
+
 namespace {
 Teuchos::ParameterList multigrid_settings()
 {
@@ -45,6 +45,14 @@ void make_diagonal_positive(TrilinosMatrix &matrix)
   for (auto row = range.first; row < range.second; ++row)
     matrix.set(row, row, diagonal(row));
   matrix.compress(dealii::VectorOperation::insert);
+}
+
+/// target -= matrix * vector
+void subtract(TrilinosVector &target, const TrilinosMatrix &matrix, TrilinosVector &vector)
+{
+  vector *= -1.;
+  matrix.vmult_add(target, vector);
+  vector *= -1.;
 }
 
 TrilinosVector inverse(const TrilinosVector &vector)
@@ -130,7 +138,7 @@ void Multigrid::build(const TrilinosMatrix &matrix, const unsigned int dim, cons
   amg.initialize(matrix, list);
 }
 
-void SchurInverse::build(const LinearSolver::BlockMatrix &matrix, const PreconditionerData &data)
+void SchurInverse::build(const BlockMatrix &matrix, const PreconditionerData &data)
 {
   const TrilinosMatrix &D = matrix.block(1, 1);
   if (data.pressure_mass)
@@ -161,122 +169,114 @@ void SchurInverse::vmult(TrilinosVector &result, const TrilinosVector &source) c
   }
 }
 
-struct DisplacementInverse::Saddle
+void BlockOperator::vmult(BlockVector &result, const BlockVector &source) const
 {
-  const DisplacementInverse &owner;
-  void vmult(BlockVector &result, const BlockVector &source) const
-  {
-    owner.data.shear->vmult(result.block(0), source.block(0));
-    owner.data.gradient->vmult_add(result.block(0), source.block(1));
-    owner.data.gradient->Tvmult(result.block(1), source.block(0));
-    owner.pressure_scratch = source.block(1);
-    owner.pressure_scratch.scale(*owner.data.volumetric_compliance);
-    result.block(1) -= owner.pressure_scratch;
-  }
-};
-
-struct DisplacementInverse::SaddleInverse
-{
-  const DisplacementInverse &owner;
-  void vmult(BlockVector &result, const BlockVector &source) const
-  {
-    TrilinosVector &pi = result.block(1), &work = owner.pressure_scratch;
-    pi = source.block(1);
-    pi.scale(owner.stiff_inverse);
-    if (owner.data.inertia) {
-      owner.inert_inverse.vmult(work, source.block(1));
-      pi += work;
-    }
-    owner.force_scratch = source.block(0);
-    owner.data.gradient->vmult_add(owner.force_scratch, pi);
-    pi *= -1.;
-    owner.multigrid.vmult(result.block(0), owner.force_scratch);
-  }
-};
-
-void DisplacementInverse::build(const TrilinosMatrix &matrix, const PreconditionerData &new_data,
-                                const unsigned int dim, const std::vector<double> &modes)
-{
-  data = new_data;
-  mixed = data.shear != nullptr;
-  multigrid.build(mixed ? *data.shear : matrix, dim, modes);
-  if (mixed)
-    build_saddle();
-}
-
-void DisplacementInverse::build_saddle()
-{
-  const TrilinosVector &volumetric = *data.volumetric_compliance;
-  pressure_scratch = volumetric;
-  pressure_scratch += *data.shear_compliance;
-  stiff_inverse = inverse(pressure_scratch);
-  if (data.inertia) {
-    // G^T diag(c_a M)^-1 G + W
-    data.gradient->Tmmult(inert, *data.gradient, inverse(*data.inertia));
-    const auto range = inert.local_range();
-    for (auto row = range.first; row < range.second; ++row)
-      inert.add(row, row, volumetric(row));
-    inert.compress(dealii::VectorOperation::add);
-    inert_inverse.build(inert);
-  }
-  const std::vector<dealii::IndexSet> owned{data.shear->locally_owned_range_indices(),
-                                            volumetric.locally_owned_elements()};
-  for (BlockVector *vector : {&unknown, &right_side, &scratch, &scaling, &inverse_scaling})
-    vector->reinit(owned, data.shear->get_mpi_communicator());
-  force_scratch = unknown.block(0);
-  scaling.block(0) = inverse(absolute_diagonal(*data.shear));
-  scaling.block(1) = stiff_inverse;
-  for (unsigned int b = 0; b < 2; ++b)
-    for (unsigned int i = 0; i < scaling.block(b).locally_owned_size(); ++i) {
-      double &factor = scaling.block(b).trilinos_vector()[0][i];
-      factor = std::sqrt(factor);
-      inverse_scaling.block(b).trilinos_vector()[0][i] = 1. / factor;
-    }
-}
-
-void DisplacementInverse::vmult(TrilinosVector &result, const TrilinosVector &source) const
-{
-  if (!mixed) {
-    multigrid.vmult(result, source);
+  if (!data.shear) {
+    matrix.vmult(result, source);
     return;
   }
-  const Saddle matrix{*this};
-  const SaddleInverse approximate{*this};
-  using System = ScaledSystem<Saddle, SaddleInverse>;
-  const System system{matrix, approximate, scaling, inverse_scaling, scratch};
-  right_side.block(0) = source;
-  right_side.block(1) = 0.;
-  right_side.scale(scaling);
-  unknown = 0.;
-  const double reduction = 0.05;
-  dealii::IterationNumberControl control(20, reduction * right_side.l2_norm());
-  control.log_result(false);
-  dealii::SolverFGMRES<BlockVector> solver(control, dealii::SolverFGMRES<BlockVector>::AdditionalData(22));
-  solver.solve(System::Rows{system}, unknown, right_side, System::Columns{system});
-  result = unknown.block(0);
+  const unsigned int last = source.n_blocks() - 1;
+  data.shear->vmult(result.block(0), source.block(0));
+  if (last == 2) {
+    matrix.block(0, 1).vmult_add(result.block(0), source.block(1));
+    matrix.block(1, 0).vmult(result.block(1), source.block(0));
+    matrix.block(1, 1).vmult_add(result.block(1), source.block(1));
+  }
+  data.gradient->vmult_add(result.block(0), source.block(last));
+  // G^T u - W pi
+  result.block(last) = source.block(last);
+  result.block(last).scale(*data.volumetric_compliance);
+  result.block(last) *= -1.;
+  data.gradient->Tvmult_add(result.block(last), source.block(0));
+}
+
+void VolumetricInverse::build(const PreconditionerData &data)
+{
+  scratch = *data.volumetric_compliance;
+  scratch += *data.shear_compliance;
+  stiff_inverse = inverse(scratch);
+  has_inertia = data.inertia != nullptr;
+  if (!has_inertia)
+    return;
+  data.gradient->Tmmult(inert, *data.gradient, inverse(*data.inertia));
+  const auto range = inert.local_range();
+  for (auto row = range.first; row < range.second; ++row)
+    inert.add(row, row, (*data.volumetric_compliance)(row));
+  inert.compress(dealii::VectorOperation::add);
+  inert_inverse.build(inert);
+}
+
+void VolumetricInverse::vmult(TrilinosVector &result, const TrilinosVector &source) const
+{
+  result = source;
+  result.scale(stiff_inverse);
+  if (has_inertia) {
+    inert_inverse.vmult(scratch, source);
+    result += scratch;
+  }
 }
 
 BlockPreconditioner::BlockPreconditioner(const DisplacementUnknowns &unknowns)
     : dim(unknowns.dim), modes(rigid_body_modes(unknowns))
 {}
 
-void BlockPreconditioner::build(const LinearSolver::BlockMatrix &new_matrix, const PreconditionerData &data)
+void BlockPreconditioner::build(const BlockMatrix &new_matrix, const PreconditionerData &new_data)
 {
   matrix = &new_matrix;
-  displacement.build(matrix->block(0, 0), data, dim, modes);
+  data = new_data;
+  const TrilinosMatrix &stiffness = data.shear ? *data.shear : matrix->block(0, 0);
+  displacement.build(stiffness, dim, modes);
+  if (data.shear)
+    volumetric.build(data);
   if (matrix->n_block_rows() == 2)
     schur.build(*matrix, data);
-  u_scratch.reinit(matrix->block(0, 0).locally_owned_range_indices(), matrix->get_mpi_communicator());
+  if (data.shear && matrix->n_block_rows() == 2) {
+    p_scratch.reinit(matrix->block(1, 1).locally_owned_range_indices(), matrix->get_mpi_communicator());
+    psi_scratch = projected = *data.volumetric_compliance;
+  }
+  u_scratch.reinit(stiffness.locally_owned_range_indices(), stiffness.get_mpi_communicator());
 }
 
-void BlockPreconditioner::vmult(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const
+void BlockPreconditioner::vmult(BlockVector &result, const BlockVector &source) const
 {
+  const bool has_pressure = matrix->n_block_rows() == 2, mixed = data.shear != nullptr;
   u_scratch = source.block(0);
-  if (matrix->n_block_rows() == 2) {
+  if (mixed && has_pressure)
+    solve_pressures(result, source);
+  else if (has_pressure) {
     schur.vmult(result.block(1), source.block(1));
-    matrix->block(0, 1).vmult_add(u_scratch, result.block(1)); // p = -S^-1 f_p
+    result.block(1) *= -1.;
+  } else if (mixed) {
+    volumetric.vmult(result.block(1), source.block(1));
     result.block(1) *= -1.;
   }
+  // u = A^-1 (f_u - B p - G pi)
+  if (has_pressure)
+    subtract(u_scratch, matrix->block(0, 1), result.block(1));
+  if (mixed)
+    subtract(u_scratch, *data.gradient, result.block(result.n_blocks() - 1));
   displacement.vmult(result.block(0), u_scratch);
+}
+
+void BlockPreconditioner::solve_pressures(BlockVector &result, const BlockVector &source) const
+{
+  const TrilinosVector &f = source.block(2);
+  TrilinosVector &p = result.block(1), &pi = result.block(2);
+  // f_p + P^T (f_pi - W V f_pi)
+  volumetric.vmult(pi, f);
+  psi_scratch = pi;
+  psi_scratch.scale(*data.volumetric_compliance);
+  psi_scratch.sadd(-1., f);
+  data.projection->Tvmult(p_scratch, psi_scratch);
+  p_scratch += source.block(1);
+  schur.vmult(p, p_scratch);
+  p *= -1.;
+  // pi = P p - V (f_pi + W P p)
+  data.projection->vmult(projected, p);
+  psi_scratch = projected;
+  psi_scratch.scale(*data.volumetric_compliance);
+  psi_scratch += f;
+  volumetric.vmult(pi, psi_scratch);
+  pi.sadd(-1., projected);
 }
 } // namespace peat

@@ -59,39 +59,6 @@ private:
   dealii::TrilinosWrappers::PreconditionAMG amg;
 };
 
-/// FGMRES on rows scaled by given factors, so that residuals of different units count alike; the solution is not
-/// scaled. Operator and preconditioner have vmult(result, source) on block vectors.
-template <class Operator, class Inverse>
-struct ScaledSystem
-{
-  using Vector = LinearSolver::BlockVector;
-  const Operator &matrix;
-  const Inverse &inverse;
-  const Vector &scaling, &inverse_scaling;
-  Vector &scratch;
-
-  /// The operator of the scaled system, and its preconditioner.
-  struct Rows
-  {
-    const ScaledSystem &system;
-    void vmult(Vector &result, const Vector &source) const
-    {
-      system.matrix.vmult(result, source);
-      result.scale(system.scaling);
-    }
-  };
-  struct Columns
-  {
-    const ScaledSystem &system;
-    void vmult(Vector &result, const Vector &source) const
-    {
-      system.scratch = source;
-      system.scratch.scale(system.inverse_scaling);
-      system.inverse.vmult(result, system.scratch);
-    }
-  };
-};
-
 /// Approximate inverse of a Schur complement  S = E + N (c_a M + c_k K)^-1 N^T  of pressures (E: compliance and
 /// conduction, N: divergence) by
 ///
@@ -117,34 +84,42 @@ private:
   mutable TrilinosVector scratch;
 };
 
-/// Approximate inverse of A: multigrid, or, for nearly incompressible skeletons, a few steps of FGMRES on
+/// The operator that FGMRES sees: the block matrix, or, for nearly incompressible skeletons, the one with the
+/// unknowns pi = lambda Pi(div u) added as a last block,
 ///
-///     [ A_s   G  ] [u]     A_s: A without its volumetric part,  pi = lambda Pi div u,
-///     [ G^T  -W  ] [pi]    G: gradient, W: volumetric compliance
+///     [ A_s  B   G ]      A_s: A without its volumetric part
+///     [ C    D   0 ]      G: int div(N_u) psi
+///     [ G^T  0  -W ]      W: volumetric compliance
 ///
-/// from which A results when pi is eliminated. Multigrid on A itself needs iterations that grow with
-/// sqrt(lambda/mu), since its coarse spaces lock; A_s knows no lambda. (Lee, Mardal & Winther 2017, total pressure.)
-class DisplacementInverse
+/// from which the block matrix results when pi is eliminated. Multigrid on A itself needs iterations that grow
+/// with sqrt(lambda / mu), because its coarse spaces lock; A_s knows no lambda. (Lee, Mardal & Winther 2017 do the
+/// same with a total pressure.)
+class BlockOperator
 {
 public:
-  void build(const TrilinosMatrix &matrix, const PreconditionerData &data, unsigned int dim,
-             const std::vector<double> &modes);
+  using BlockVector = LinearSolver::BlockVector;
+  BlockOperator(const LinearSolver::BlockMatrix &matrix, const PreconditionerData &data) : matrix(matrix), data(data)
+  {}
+  void vmult(BlockVector &result, const BlockVector &source) const;
+
+private:
+  const LinearSolver::BlockMatrix &matrix;
+  const PreconditionerData data;
+};
+
+/// The same as SchurInverse for pi, whose F is a diagonal.
+class VolumetricInverse
+{
+public:
+  void build(const PreconditionerData &data);
   void vmult(TrilinosVector &result, const TrilinosVector &source) const;
 
 private:
-  using BlockVector = LinearSolver::BlockVector;
-  struct Saddle;
-  struct SaddleInverse;
-  void build_saddle();
-
-  Multigrid multigrid;
-  PreconditionerData data;
-  bool mixed = false;
-  TrilinosVector stiff_inverse; ///< of the Schur complement without inertia, diagonal
-  TrilinosMatrix inert; ///< the one where nothing but inertia counts
+  TrilinosVector stiff_inverse;
+  TrilinosMatrix inert; ///< W + G^T diag(c_a M)^-1 G
   Multigrid inert_inverse;
-  mutable BlockVector unknown, right_side, scratch, scaling, inverse_scaling;
-  mutable TrilinosVector pressure_scratch, force_scratch;
+  bool has_inertia = false;
+  mutable TrilinosVector scratch;
 };
 
 /// Block triangular: pressures by the Schur complement, then displacements.
@@ -156,12 +131,20 @@ public:
   void vmult(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const override;
 
 private:
+  /// p and pi = t + P p by elimination of t, the total pressure, from
+  ///     [ -(W + S_t)   -W P            ] [t]   [f_pi          ]      P: projection,  (W + S_t)^-1: VolumetricInverse,
+  ///     [ -P^T W       -(E + P^T W P)  ] [p] = [f_p + P^T f_pi]      Schur complement for p: SchurInverse
+  /// in which u and p hardly meet: div u sees p - Pi p only.
+  void solve_pressures(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const;
+
   const unsigned int dim;
   std::vector<double> modes;
   const LinearSolver::BlockMatrix *matrix = nullptr;
-  DisplacementInverse displacement;
+  PreconditionerData data;
+  Multigrid displacement;
+  VolumetricInverse volumetric;
   SchurInverse schur;
-  mutable TrilinosVector u_scratch;
+  mutable TrilinosVector u_scratch, p_scratch, psi_scratch, projected;
 };
 
 /// The rigid-body modes of the unknowns, mode after mode: dim translations, then 1 or 3 rotations about the middle;

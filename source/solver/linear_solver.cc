@@ -104,16 +104,22 @@ void LinearSolver::find_scaling()
   std::vector<dealii::IndexSet> owned;
   for (unsigned int b = 0; b < n_blocks; ++b)
     owned.push_back(matrix->block(b, b).locally_owned_range_indices());
-  for (BlockVector *vector : {&scaling, &inverse_scaling, &residual})
+  if (mixed())
+    owned.push_back(data.volumetric_compliance->locally_owned_elements());
+  for (BlockVector *vector : {&scaling, &inverse_scaling, &scratch, &unknown, &right_side})
     vector->reinit(owned, matrix->block(0, 0).get_mpi_communicator());
 
-  scaling.block(0) = absolute_diagonal(matrix->block(0, 0));
+  scaling.block(0) = absolute_diagonal(mixed() ? *data.shear : matrix->block(0, 0));
   if (n_blocks == 2) {
     // the diagonal of the Schur complement, as SIMPLE approximates it
-    scaling.block(1) = absolute_diagonal(matrix->block(1, 1));
-    scaling.block(1) += diagonal_of_product(matrix->block(1, 0), scaling.block(0));
+    scaling.block(1) = diagonal_of_product(matrix->block(1, 0), absolute_diagonal(matrix->block(0, 0)));
+    scaling.block(1) += absolute_diagonal(matrix->block(1, 1));
   }
-  for (unsigned int b = 0; b < n_blocks; ++b)
+  if (mixed()) {
+    scaling.block(n_blocks) = *data.volumetric_compliance;
+    scaling.block(n_blocks) += *data.shear_compliance;
+  }
+  for (unsigned int b = 0; b < scaling.n_blocks(); ++b)
     for (unsigned int i = 0; i < scaling.block(b).locally_owned_size(); ++i) {
       double &factor = scaling.block(b).trilinos_vector()[0][i];
       const double root = std::sqrt(factor);
@@ -122,28 +128,70 @@ void LinearSolver::find_scaling()
     }
 }
 
-unsigned int LinearSolver::iterate(BlockVector &solution, const BlockVector &scaled_rhs, const double target,
-                                   bool &converged)
+/// Row-scaled operator and preconditioner: residuals of different units count alike, unknowns are not scaled.
+struct LinearSolver::ScaledRows
 {
-  using System = ScaledSystem<BlockMatrix, Preconditioner>;
-  const System system{*matrix, *preconditioner, scaling, inverse_scaling, residual};
+  const BlockOperator &matrix;
+  const BlockVector &scaling;
+  void vmult(BlockVector &result, const BlockVector &source) const
+  {
+    matrix.vmult(result, source);
+    result.scale(scaling);
+  }
+};
+
+struct LinearSolver::ScaledInverse
+{
+  const Preconditioner &inverse;
+  const BlockVector &inverse_scaling;
+  BlockVector &scratch;
+  void vmult(BlockVector &result, const BlockVector &source) const
+  {
+    scratch = source;
+    scratch.scale(inverse_scaling);
+    inverse.vmult(result, scratch);
+  }
+};
+
+unsigned int LinearSolver::iterate(const double target, bool &converged)
+{
+  const BlockOperator block_operator(*matrix, mixed() ? data : PreconditionerData());
+  const ScaledRows rows{block_operator, scaling};
+  const ScaledInverse inverse{*preconditioner, inverse_scaling, scratch};
   dealii::SolverControl control(parameters.max_iterations, target);
   control.log_result(false);
   dealii::SolverFGMRES<BlockVector> solver(control, dealii::SolverFGMRES<BlockVector>::AdditionalData(basis_size));
   try {
-    solver.solve(System::Rows{system}, solution, scaled_rhs, System::Columns{system});
+    solver.solve(rows, unknown, right_side, inverse);
     converged = true;
   } catch (const dealii::SolverControl::NoConvergence &) {
     converged = false;
   }
+  reached = control.last_value();
   return control.last_step();
+}
+
+double LinearSolver::take_up(const BlockVector &solution, const BlockVector &rhs)
+{
+  for (unsigned int b = 0; b < rhs.n_blocks(); ++b) {
+    right_side.block(b) = rhs.block(b);
+    unknown.block(b) = solution.block(b);
+  }
+  if (mixed()) {
+    const unsigned int last = rhs.n_blocks();
+    right_side.block(last) = 0.;
+    // pi = W^-1 G^T u
+    data.gradient->Tvmult(unknown.block(last), solution.block(0));
+    for (unsigned int i = 0; i < unknown.block(last).locally_owned_size(); ++i)
+      unknown.block(last).trilinos_vector()[0][i] /= data.volumetric_compliance->trilinos_vector()[0][i];
+  }
+  right_side.scale(scaling);
+  return right_side.l2_norm();
 }
 
 unsigned int LinearSolver::solve(BlockVector &solution, const BlockVector &rhs)
 {
-  BlockVector scaled_rhs(rhs);
-  scaled_rhs.scale(scaling);
-  const double size = scaled_rhs.l2_norm();
+  const double size = take_up(solution, rhs);
   if (!std::isfinite(size))
     throw NumericalError("the forces of " + purpose + " are not finite numbers");
   if (size == 0.) {
@@ -152,21 +200,18 @@ unsigned int LinearSolver::solve(BlockVector &solution, const BlockVector &rhs)
   }
   const double target = parameters.tolerance * size;
   bool converged;
-  unsigned int n = iterate(solution, scaled_rhs, target, converged);
+  unsigned int n = iterate(target, converged);
   if (!converged && !is_fresh) {
     build();
-    solution = 0.;
-    n += iterate(solution, scaled_rhs, target, converged);
+    n += iterate(target, converged);
   }
-  if (!converged) {
-    matrix->vmult(residual, solution);
-    residual.scale(scaling);
-    residual -= scaled_rhs;
-    throw NumericalError("the linear equations of " + purpose + " are solved only to " +
-                         short_number(residual.l2_norm() / size) + " after " + std::to_string(n) +
-                         " iterations, not to the Tolerance " + short_number(parameters.tolerance) +
+  if (!converged)
+    throw NumericalError("the linear equations of " + purpose + " are solved only to " + short_number(reached / size) +
+                         " after " + std::to_string(n) + " iterations, not to the Tolerance " +
+                         short_number(parameters.tolerance) +
                          ": set Method = direct, or more Iterations, and look for cells with next to no material");
-  }
+  for (unsigned int b = 0; b < solution.n_blocks(); ++b)
+    solution.block(b) = unknown.block(b);
   if (fresh_iterations == 0)
     fresh_iterations = std::max(n, 1u);
   is_worn = n > tolerated(fresh_iterations);

@@ -69,7 +69,7 @@ public:
   dealii::TrilinosWrappers::SparseMatrix pressure_mass; ///< int c_k^2 alpha^2/(c_k (lambda + 2 mu/dim)) N_p N_p
   dealii::TrilinosWrappers::MPI::Vector inertia;        ///< diagonal of c_a M
 
-  dealii::TrilinosWrappers::SparseMatrix shear, gradient; ///< see peat::PreconditionerData; only if `projected`
+  dealii::TrilinosWrappers::SparseMatrix shear, gradient, projection; ///< see peat::PreconditionerData; only if `projected`
   dealii::TrilinosWrappers::MPI::Vector volumetric_compliance, shear_compliance;
 
   peat::PreconditionerData data() const
@@ -84,6 +84,7 @@ public:
       result.gradient = &gradient;
       result.volumetric_compliance = &volumetric_compliance;
       result.shear_compliance = &shear_compliance;
+      result.projection = &projection;
     }
     return result;
   }
@@ -196,17 +197,17 @@ private:
     if (!setting.projected)
       return;
     const unsigned int np = p_element.n_dofs_per_cell();
-    Matrix moments(np, dim + 1);
+    moments.reinit(dim + 1, np);
     for (unsigned int q = 0; q < quadrature.size(); ++q)
       for (unsigned int i = 0; i < np; ++i)
         for (unsigned int k = 0; k <= dim; ++k)
-          moments(i, k) += weights.JxW(q) * p_values.shape_value(i, q) *
+          moments(k, i) += 1. / volume * weights.JxW(q) * p_values.shape_value(i, q) *
                            (k == 0 ? 1. : std::sqrt(12.) * (quadrature.point(q)[k - 1] - 0.5));
     for (unsigned int i = 0; i < np; ++i)
       for (unsigned int j = 0; j < np; ++j) {
         double projected = 0.;
         for (unsigned int k = 0; k <= dim; ++k)
-          projected += moments(i, k) * moments(j, k) / volume;
+          projected += moments(k, i) * moments(k, j) * volume;
         Mp(i, j) = projected / bulk + (Mp(i, j) * bulk - projected) / (2. * mu);
       }
   }
@@ -222,19 +223,21 @@ private:
     Pattern uu(u_owned, u_owned, u_relevant, communicator), up(u_owned, p_owned, u_relevant, communicator),
         pu(p_owned, u_owned, p_relevant, communicator), pp(p_owned, p_owned, p_relevant, communicator);
     const dealii::IndexSet psi_owned = cellwise();
-    Pattern u_psi(u_owned, psi_owned, u_relevant, communicator);
+    Pattern u_psi(u_owned, psi_owned, u_relevant, communicator), psi_p(psi_owned, p_owned, communicator);
     for_cells([&](const Indices &iu, const Indices &ip, const Indices &ipsi, const bool) {
       for (const auto row : iu) {
         uu.add_entries(row, iu.begin(), iu.end());
         up.add_entries(row, ip.begin(), ip.end());
         u_psi.add_entries(row, ipsi.begin(), ipsi.end());
       }
+      for (const auto row : ipsi)
+        psi_p.add_entries(row, ip.begin(), ip.end());
       for (const auto row : ip) {
         pu.add_entries(row, iu.begin(), iu.end());
         pp.add_entries(row, ip.begin(), ip.end());
       }
     });
-    for (Pattern *pattern : {&uu, &up, &pu, &pp, &u_psi})
+    for (Pattern *pattern : {&uu, &up, &pu, &pp, &u_psi, &psi_p})
       pattern->compress();
     const unsigned int n_blocks = setting.saturated ? 2 : 1;
     matrix.reinit(n_blocks, n_blocks);
@@ -253,6 +256,7 @@ private:
     if (setting.projected) {
       shear.reinit(uu);
       gradient.reinit(u_psi);
+      projection.reinit(psi_p);
       volumetric_compliance.reinit(psi_owned, communicator);
       shear_compliance.reinit(psi_owned, communicator);
     }
@@ -333,6 +337,7 @@ private:
       if (setting.projected) {
         add(shear, A_shear, iu, u_fixed, iu, u_fixed, factor, true);
         add(gradient, G, iu, u_fixed, ipsi, psi_free, factor, false);
+        add(projection, moments, ipsi, psi_free, ip, p_fixed, 1., false);
         for (const auto k : ipsi) {
           volumetric_compliance(k) += factor * volumetric;
           shear_compliance(k) += factor * shearing;
@@ -353,6 +358,7 @@ private:
     if (setting.projected) {
       shear.compress(dealii::VectorOperation::add);
       gradient.compress(dealii::VectorOperation::add);
+      projection.compress(dealii::VectorOperation::add);
       volumetric_compliance.compress(dealii::VectorOperation::add);
       shear_compliance.compress(dealii::VectorOperation::add);
     }
@@ -378,7 +384,7 @@ private:
   }
 
   double c_a, volumetric, shearing;
-  Matrix A, A_shear, B, C, D, Mp, G;
+  Matrix A, A_shear, B, C, D, Mp, G, moments;
   std::vector<double> mass_diagonal;
   std::vector<bool> u_fixed, p_fixed;
 };

@@ -61,6 +61,9 @@ struct PreconditionerData
   const Matrix *gradient = nullptr; ///< int div(N_u) psi [n_u][n_psi]; rows of fixed unknowns are 0
   const Vector *volumetric_compliance = nullptr; ///< int psi psi / (c_k lambda), diagonal [n_psi]
   const Vector *shear_compliance = nullptr;      ///< int psi psi / (2 c_k mu), diagonal [n_psi]
+  /// c_k int alpha psi N_p / int psi psi [n_psi][n_p], the projection on the cells; columns of constrained unknowns are
+  /// 0. Only with a p block.
+  const Matrix *projection = nullptr;
 };
 
 /// Solves the block systems of the u-p form,
@@ -113,7 +116,14 @@ private:
   bool choose_direct() const;
   void build();
   void find_scaling();
-  unsigned int iterate(BlockVector &solution, const BlockVector &rhs, double target, bool &converged);
+  /// Solves for the volumetric stress beside u and p.
+  bool mixed() const { return !direct && data.shear != nullptr; }
+  /// Fills `unknown` and `right_side`; returns the norm of the latter.
+  double take_up(const BlockVector &solution, const BlockVector &rhs);
+  unsigned int iterate(double target, bool &converged);
+
+  struct ScaledRows;
+  struct ScaledInverse;
 
   const LinearSolverParameters &parameters;
   const std::string purpose;
@@ -122,7 +132,8 @@ private:
   PreconditionerData data;
   BlockVector scaling;         ///< of the rows: 1 / sqrt(diagonal)
   BlockVector inverse_scaling; ///< its inverse
-  BlockVector residual;        ///< scratch
+  BlockVector unknown, right_side, scratch; ///< with the volumetric stress, if it is solved for
+  double reached = 0.;                      ///< residual of the last solve
 
   std::unique_ptr<Preconditioner> preconditioner;
   bool direct = false;
