@@ -7,8 +7,6 @@
 #include <Amesos.h>
 #include <Teuchos_ParameterList.hpp>
 
-#include <cstdlib>
-
 namespace peat {
 namespace {
 using BlockMatrix = LinearSolver::BlockMatrix;
@@ -86,8 +84,10 @@ void DirectFactor::build(const BlockMatrix &matrix, const PreconditionerData &)
   else
     make_pattern(matrix);
   if (!solver) {
-    const char *name = std::getenv("PEAT_DIRECT");
-    solver.reset(Amesos().Create(name ? name : "Amesos_Mumps", *problem));
+    // MUMPS: 70 times faster than KLU on 20,000 unknowns of Q2/Q1 in 2-D. KLU is in every Trilinos.
+    solver.reset(Amesos().Create("Amesos_Mumps", *problem));
+    if (!solver)
+      solver.reset(Amesos().Create("Amesos_Klu", *problem));
     Teuchos::ParameterList list;
     solver->SetParameters(list);
     if (solver->SymbolicFactorization() != 0)

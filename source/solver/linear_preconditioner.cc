@@ -119,9 +119,10 @@ std::vector<double> rigid_body_modes(const DisplacementUnknowns &unknowns)
   return modes;
 }
 
-void Multigrid::build(const TrilinosMatrix &matrix)
+void Multigrid::build(const TrilinosMatrix &matrix, const unsigned int n_components)
 {
   Teuchos::ParameterList list = multigrid_settings();
+  list.set("PDE equations", int(n_components));
   amg.initialize(matrix, list);
 }
 
@@ -148,14 +149,14 @@ void SchurInverse::build(const BlockMatrix &matrix, const PreconditionerData &da
     stiff *= -1.;
   }
   make_diagonal_positive(stiff);
-  stiff_inverse.build(stiff);
+  stiff_inverse.build(stiff, 1);
   has_inertia = data.inertia != nullptr;
   if (has_inertia) {
     TrilinosMatrix product;
     matrix.block(1, 0).mmult(product, matrix.block(0, 1), inverse(*data.inertia));
     sum(inert, product, 1., D, -1.);
     make_diagonal_positive(inert);
-    inert_inverse.build(inert);
+    inert_inverse.build(inert, 1);
   }
   scratch.reinit(stiff.locally_owned_range_indices(), stiff.get_mpi_communicator());
 }
@@ -192,27 +193,36 @@ void BlockOperator::vmult(BlockVector &result, const BlockVector &source) const
 
 void VolumetricInverse::build(const PreconditionerData &data)
 {
-  scratch = *data.volumetric_compliance;
-  scratch += *data.shear_compliance;
+  const TrilinosVector &W = *data.volumetric_compliance, &F = *data.shear_compliance;
+  scratch = W;
+  scratch += F;
   stiff_inverse = inverse(scratch);
   has_inertia = data.inertia != nullptr;
   if (!has_inertia)
     return;
+  share = F;
+  share.scale(stiff_inverse);
   data.gradient->Tmmult(inert, *data.gradient, inverse(*data.inertia));
   const auto range = inert.local_range();
   for (auto row = range.first; row < range.second; ++row)
-    inert.add(row, row, (*data.volumetric_compliance)(row));
+    inert.add(row, row, W(row) * share(row));
   inert.compress(dealii::VectorOperation::add);
-  inert_inverse.build(inert);
+  inert_inverse.build(inert, data.n_psi_per_cell);
 }
 
 void VolumetricInverse::vmult(TrilinosVector &result, const TrilinosVector &source) const
 {
-  result = source;
-  result.scale(stiff_inverse);
   if (has_inertia) {
-    inert_inverse.vmult(scratch, source);
+    scratch = source;
+    scratch.scale(share);
+    inert_inverse.vmult(result, scratch);
+    result.scale(share);
+    scratch = source;
+    scratch.scale(stiff_inverse);
     result += scratch;
+  } else {
+    result = source;
+    result.scale(stiff_inverse);
   }
 }
 

@@ -49,8 +49,8 @@ private:
 class Multigrid
 {
 public:
-  /// A scalar unknown.
-  void build(const TrilinosMatrix &matrix);
+  /// n_components unknowns stand together at each place; the near-null space is constant in each.
+  void build(const TrilinosMatrix &matrix, unsigned int n_components);
   /// Displacements; modes [n_modes * n_owned] span the near-null space and must live as long as this.
   void build(const TrilinosMatrix &matrix, unsigned int dim, const std::vector<double> &modes);
   void vmult(TrilinosVector &result, const TrilinosVector &source) const { amg.vmult(result, source); }
@@ -107,7 +107,10 @@ private:
   const PreconditionerData data;
 };
 
-/// The same as SchurInverse for pi, whose F is a diagonal.
+/// Approximate inverse of the Schur complement  W + (F^-1 + L^-1)^-1  of pi, where W and F (volumetric and shear
+/// compliance) are diagonal and L = G^T diag(c_a M)^-1 G. By the formula of Woodbury, used twice,
+///
+///     S^-1 = 1 / (W + F) + s (L + s W)^-1 s,        s = F / (W + F).
 class VolumetricInverse
 {
 public:
@@ -115,8 +118,9 @@ public:
   void vmult(TrilinosVector &result, const TrilinosVector &source) const;
 
 private:
-  TrilinosVector stiff_inverse;
-  TrilinosMatrix inert; ///< W + G^T diag(c_a M)^-1 G
+  TrilinosVector stiff_inverse; ///< 1 / (W + F)
+  TrilinosVector share;         ///< s
+  TrilinosMatrix inert;         ///< L + s W
   Multigrid inert_inverse;
   bool has_inertia = false;
   mutable TrilinosVector scratch;

@@ -84,7 +84,9 @@ public:
       result.gradient = &gradient;
       result.volumetric_compliance = &volumetric_compliance;
       result.shear_compliance = &shear_compliance;
-      result.projection = &projection;
+      if (setting.saturated)
+        result.projection = &projection;
+      result.n_psi_per_cell = dim + 1;
     }
     return result;
   }

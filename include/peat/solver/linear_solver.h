@@ -21,8 +21,8 @@ struct LinearSolverParameters
   enum class Method { automatic, direct, iterative };
 
   Method method = Method::automatic;
-  unsigned int direct_limit_2d = 150000; ///< largest number of unknowns for which `automatic` is direct, in 2-D
-  unsigned int direct_limit_3d = 8000;   ///< the same in 3-D
+  unsigned int direct_limit_2d = 60000; ///< largest number of unknowns for which `automatic` is direct, in 2-D
+  unsigned int direct_limit_3d = 4000;   ///< the same in 3-D
   double tolerance = 1e-11;              ///< residual over right-hand side, in the norm of LinearSolver
   unsigned int max_iterations = 200;
 };
@@ -64,6 +64,7 @@ struct PreconditionerData
   /// c_k int alpha psi N_p / int psi psi [n_psi][n_p], the projection on the cells; columns of constrained unknowns are
   /// 0. Only with a p block.
   const Matrix *projection = nullptr;
+  unsigned int n_psi_per_cell = 1; ///< these stand together, the constant first
 };
 
 /// Solves the block systems of the u-p form,
