@@ -204,6 +204,7 @@ public:
       M.resize(n_points, n_p);
       storage.resize(n_points, n_p);
       coupling.resize(n_points, n_p);
+      drained.resize(n_points, n_p);
       dM.resize(n_points * dim, n_p);
       mobility.resize(n_points * dim, n_p);
       drag.resize(n_points * dim, n_p);
@@ -212,6 +213,11 @@ public:
   void add(const Points &points, const std::array<Lanes, 36> &tangent, const Coefficients &c, bool has_pressure);
   /// The cell's matrix: minus the derivative of the residual.
   void multiply(const TimeLevel &level, bool has_pressure, dealii::FullMatrix<double> &result);
+  /// sum V alpha^2 / K N_p N_p with the drained bulk modulus K.
+  Eigen::Matrix<double, n_p, n_p> pressure_mass() const
+  {
+    return M.topRows(rows).transpose() * drained.topRows(rows);
+  }
   /// Compliance for the stabilisation [1/Pa]: the larger of 1/M (one-dimensional optimum) and 1/(4 G).
   double compliance() const { return largest_compliance; }
 
@@ -219,7 +225,7 @@ private:
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   unsigned int rows = 0; ///< points so far
   double largest_compliance = 0.;
-  Matrix B, DB, N, mN, divergence, M, storage, coupling, dM, mobility, drag;
+  Matrix B, DB, N, mN, divergence, M, storage, coupling, drained, dM, mobility, drag;
   Matrix K, mass, Qc, S, H, G;
 };
 
@@ -233,6 +239,8 @@ void StackedPoints<dim, reach>::add(const Points &points, const std::array<Lanes
     const double V = points.volume[l];
     largest_compliance =
         std::max({largest_compliance, 1. / tangent[0][l], tangent[21][l] > 0. ? 0.25 / tangent[21][l] : 0.});
+    // Bulk modulus lambda + 2 mu / dim.
+    const double bulk = (tangent[0][l] + (dim - 1) * tangent[1][l]) / dim;
     Eigen::Matrix<double, n_strain, n_strain> D;
     for (unsigned int a = 0; a < n_strain; ++a)
       for (unsigned int b = 0; b < n_strain; ++b)
@@ -260,6 +268,7 @@ void StackedPoints<dim, reach>::add(const Points &points, const std::array<Lanes
       M(rows, i) = points.M[i][l];
       storage(rows, i) = V * c.storage[l] * points.M[i][l];
       coupling(rows, i) = V * c.alpha * points.M[i][l];
+      drained(rows, i) = V * c.alpha * c.alpha / bulk * points.M[i][l];
       for (unsigned int d = 0; d < dim; ++d) {
         const double slope = points.dM[i][d][l];
         dM(d * M.rows() + rows, i) = slope;

@@ -29,12 +29,14 @@ public:
   void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
                 const VolumeLoads<dim> &loads, double stabilisation,
                 const dealii::AffineConstraints<double> &constraints, BlockVector &residual,
-                BlockMatrix *matrix, GrossResidual &gross) override;
+                BlockMatrix *matrix, dealii::TrilinosWrappers::SparseMatrix *pressure_mass,
+                GrossResidual &gross) override;
   void update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
                      const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity, bool move,
                      StepWork &work) override;
   void add_momentum(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &momentum) override;
   void sum_mass(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &mass) override;
+  void sum_inertia(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &inertia) override;
   void sum_weight(const Body<dim> &body, const StepState &state, const VolumeLoads<dim> &loads, double time,
                   dealii::Tensor<1, dim> &weight, double &work) override;
 
@@ -66,6 +68,8 @@ private:
                     const PointValues &at, const VolumeLoads<dim> &loads, bool has_pressure,
                     GrossResidual &gross);
   void add_matrices(const Body<dim> &body, const Points &points, const PointValues &at, bool has_pressure);
+  void add_pressure_mass(const TimeLevel &level, const dealii::AffineConstraints<double> &constraints,
+                         dealii::TrilinosWrappers::SparseMatrix &matrix);
   template <typename Term>
   void sum_over_nodes(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &sums, const Term &term);
   void stabilise(const Body<dim> &body, const Slice &slice, const TimeLevel &level, const CellValues &values,
@@ -251,6 +255,7 @@ void PointForm<dim, reach>::assemble(const Body<dim> &body, const TimeLevel &lev
                                      const VolumeLoads<dim> &loads, const double stabilisation,
                                      const dealii::AffineConstraints<double> &constraints,
                                      BlockVector &residual, BlockMatrix *matrix,
+                                     dealii::TrilinosWrappers::SparseMatrix *pressure_mass,
                                      GrossResidual &gross)
 {
   const bool saturated = body.material().mixture() != nullptr;
@@ -285,7 +290,23 @@ void PointForm<dim, reach>::assemble(const Body<dim> &body, const TimeLevel &lev
     residual.add(unknowns, local_residual);
     if (matrix)
       constraints.distribute_local_to_global(local_matrix, unknowns, *matrix);
+    if (matrix && pressure_mass && has_pressure)
+      add_pressure_mass(level, constraints, *pressure_mass);
   }
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::add_pressure_mass(const TimeLevel &level,
+                                              const dealii::AffineConstraints<double> &constraints,
+                                              dealii::TrilinosWrappers::SparseMatrix &matrix)
+{
+  const auto mass = stacked.pressure_mass();
+  for (unsigned int i = 0; i < n_p; ++i)
+    for (unsigned int j = 0; j < n_p; ++j) {
+      const auto row = unknowns[n_u + i], column = unknowns[n_u + j];
+      if (row == column || (!constraints.is_constrained(row) && !constraints.is_constrained(column)))
+        matrix.add(row - space.first_pressure(), column - space.first_pressure(), level.share * mass(i, j));
+    }
 }
 
 template <int dim, unsigned int reach>
@@ -358,9 +379,8 @@ void PointForm<dim, reach>::sum_over_nodes(const Body<dim> &body, dealii::Trilin
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       const Points points(space.grid(), body, slice, begin);
       for (unsigned int d = 0; d < dim; ++d) {
-        const Lanes value = points.mass * term(points, d);
         for (unsigned int i = 0; i < Points::n_nodes; ++i)
-          local_residual[i * dim + d] += sum(points.N[i] * value);
+          local_residual[i * dim + d] += sum(points.mass * points.N[i] * term(points, i, d));
       }
     }
     std::copy_n(space.displacements(slice.cell), n_u, unknowns.begin());
@@ -372,7 +392,7 @@ template <int dim, unsigned int reach>
 void PointForm<dim, reach>::add_momentum(const Body<dim> &body,
                                          dealii::TrilinosWrappers::MPI::Vector &momentum)
 {
-  sum_over_nodes(body, momentum, [&](const Points &points, const unsigned int d) {
+  sum_over_nodes(body, momentum, [&](const Points &points, unsigned int, const unsigned int d) {
     return points.load(body.layout().velocity + d);
   });
 }
@@ -380,7 +400,15 @@ void PointForm<dim, reach>::add_momentum(const Body<dim> &body,
 template <int dim, unsigned int reach>
 void PointForm<dim, reach>::sum_mass(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &mass)
 {
-  sum_over_nodes(body, mass, [](const Points &, unsigned int) { return broadcast(1.); });
+  sum_over_nodes(body, mass, [](const Points &, unsigned int, unsigned int) { return broadcast(1.); });
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::sum_inertia(const Body<dim> &body,
+                                        dealii::TrilinosWrappers::MPI::Vector &inertia)
+{
+  sum_over_nodes(body, inertia,
+                 [](const Points &points, const unsigned int i, unsigned int) { return points.N[i]; });
 }
 
 template <int dim, unsigned int reach>

@@ -35,7 +35,7 @@ UpSolver<dim>::UpSolver(const ImplicitParameters &parameters, const LinearSolver
     : parameters(parameters), method(method), seepage_inertia(seepage_inertia), grid(grid), scene(scene),
       linear(is_linear(scene)), unknowns(grid, displacement),
       active(grid, displacement == Nodes::gimp ? 4 : 2), form(UpForm<dim>::make(unknowns)),
-      boundary(unknowns, scene, parameters.surface_penalty), linear_solver(linear_parameters), now(start_time),
+      boundary(unknowns, scene, parameters.surface_penalty), linear_solver(linear_parameters, "an implicit step"), now(start_time),
       book(carried)
 {}
 
@@ -118,12 +118,63 @@ void UpSolver<dim>::resize()
   matrix.clear();
   matrix.reinit(unknowns.owned(), pattern, communicator);
   matrix_is_valid = false;
+  describe_unknowns();
 
   for (BlockVector *vector : {&unknown, &correction, &residual, &right_side, &rate, &second, &total})
     vector->reinit(unknowns.owned(), communicator);
   for (BlockVector *vector :
        {&state.unknown, &state.rate_history, &state.second_history, &ghosted_total, &ghosted_rate})
     vector->reinit(unknowns.owned(), unknowns.relevant(), communicator);
+}
+
+template <int dim>
+void UpSolver<dim>::describe_unknowns()
+{
+  const dealii::IndexSet &owned = unknowns.owned()[0];
+  DisplacementUnknowns description;
+  description.dim = dim;
+  description.positions.resize(owned.n_elements());
+  description.components.resize(owned.n_elements());
+  description.fixed.resize(owned.n_elements());
+  for (const auto &node : unknowns.displacement_nodes())
+    for (unsigned int d = 0; d < dim; ++d) {
+      if (!owned.is_element(node.displacement[d]))
+        continue;
+      const auto i = owned.index_within_set(node.displacement[d]);
+      for (unsigned int e = 0; e < dim; ++e)
+        description.positions[i][e] = node.position[e];
+      description.components[i] = d;
+      description.fixed[i] = boundary.constraints().is_constrained(node.displacement[d]);
+    }
+  linear_solver.reinit(std::move(description));
+
+  if (unknowns.has_pressure())
+    pressure_mass.reinit(matrix.block(1, 1));
+  mass_diagonal.reinit(owned, grid.communicator());
+  for (const auto &body : scene.bodies)
+    form->sum_inertia(*body, mass_diagonal);
+  mass_diagonal.compress(dealii::VectorOperation::add);
+  const double largest = mass_diagonal.linfty_norm();
+  for (const auto index : owned)
+    if (mass_diagonal(index) == 0.)
+      mass_diagonal(index) = largest;
+  mass_diagonal.compress(dealii::VectorOperation::insert);
+}
+
+template <int dim>
+void UpSolver<dim>::prepare_linear_solver(const TimeLevel &level, const bool coupled)
+{
+  PreconditionerData data;
+  if (coupled && unknowns.has_pressure()) {
+    pressure_mass.compress(dealii::VectorOperation::add);
+    data.pressure_mass = &pressure_mass;
+  }
+  if (level.acceleration > 0.) {
+    inertia = mass_diagonal;
+    inertia *= level.acceleration;
+    data.inertia = &inertia;
+  }
+  linear_solver.prepare(matrix, data);
 }
 
 template <int dim>
@@ -156,15 +207,18 @@ template <int dim>
 void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
 {
   residual = 0.;
-  if (with_matrix)
+  if (with_matrix) {
     matrix = 0.;
+    if (pressure_mass.m() > 0)
+      pressure_mass = 0.;
+  }
   share_unknown();
   const VolumeLoads<dim> loads = volume_loads(level.time);
   gross = {};
   const double stabilisation = unknowns.nodes() == Nodes::q2 ? 0. : parameters.stabilisation;
   for (const auto &body : scene.bodies)
     form->assemble(*body, level, state, loads, stabilisation, boundary.constraints(), residual,
-                   with_matrix ? &matrix : nullptr, gross);
+                   with_matrix ? &matrix : nullptr, pressure_mass.m() > 0 ? &pressure_mass : nullptr, gross);
   boundary.assemble(level, state, residual, with_matrix ? &matrix : nullptr);
   residual.compress(dealii::VectorOperation::add);
   right_side = residual;
@@ -174,7 +228,7 @@ void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
   fill_empty_diagonal(level);
   matrix_level = level;
   matrix_is_valid = true;
-  linear_solver.prepare(matrix);
+  prepare_linear_solver(level, level.velocity > 0.);
 }
 
 template <int dim>
@@ -295,11 +349,11 @@ void UpSolver<dim>::project_start()
   matrix = 0.;
   share_unknown();
   for (const auto &body : scene.bodies)
-    form->assemble(*body, level, state, {}, 0., boundary.unused(), residual, &matrix, gross);
+    form->assemble(*body, level, state, {}, 0., boundary.unused(), residual, &matrix, nullptr, gross);
   residual.compress(dealii::VectorOperation::add);
   residual.block(0) = 0.;
   fill_empty_diagonal(level);
-  linear_solver.prepare(matrix);
+  prepare_linear_solver(level, false);
   matrix_is_valid = false;
   correction = 0.;
   linear_solver.solve(correction, residual);

@@ -79,12 +79,14 @@ public:
   static std::unique_ptr<UpForm> make(const Space<dim> &space);
 
   /// Add the body's part of the residual (right side minus left side, without regard to constraints), and, if
-  /// `matrix` is not null, of the matrix (minus the residual's derivative, constrained). Pressures act with
+  /// `matrix` is not null, of the matrix (minus the residual's derivative, constrained). `pressure_mass` gets the
+  /// sum of share V alpha^2 / K N_p N_p with the drained bulk modulus K of dim dimensions, if it is not null. Pressures act with
   /// their means over cells where the space has no pressure for a saturated body.
   virtual void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
                         const VolumeLoads<dim> &loads, double stabilisation,
                         const dealii::AffineConstraints<double> &constraints, BlockVector &residual,
-                        BlockMatrix *matrix, GrossResidual &gross) = 0;
+                        BlockMatrix *matrix, dealii::TrilinosWrappers::SparseMatrix *pressure_mass,
+                        GrossResidual &gross) = 0;
 
   /// Take the step: stress, state, pressure, displacement and velocity of the points from the unknowns and the
   /// velocity at its end (in `end_velocity`); with `move`, also positions, volumes and extents.
@@ -96,6 +98,8 @@ public:
   virtual void add_momentum(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &momentum) = 0;
   /// Add sum m N_i.
   virtual void sum_mass(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &mass) = 0;
+  /// Add sum m N_i^2, the diagonal of the mass matrix.
+  virtual void sum_inertia(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &inertia) = 0;
   /// Sum of the points' weights and other body forces, and their work on U.
   virtual void sum_weight(const Body<dim> &body, const StepState &state, const VolumeLoads<dim> &loads,
                           double time, dealii::Tensor<1, dim> &weight, double &work) = 0;

@@ -101,6 +101,8 @@ private:
   void line_search(const TimeLevel &level, double before);
   /// What is prescribed, or held by nothing, stands for itself.
   void fill_empty_diagonal(const TimeLevel &level);
+  void describe_unknowns();
+  void prepare_linear_solver(const TimeLevel &level, bool coupled);
   void share_unknown();
   /// After the unknowns have been found: points, tracers, balances.
   void accept(const TimeLevel &level, bool moves);
@@ -123,6 +125,8 @@ private:
   UpBoundary<dim> boundary;
   LinearSolver linear_solver;
   BlockMatrix matrix;
+  dealii::TrilinosWrappers::SparseMatrix pressure_mass;
+  dealii::TrilinosWrappers::MPI::Vector inertia, mass_diagonal;
   bool matrix_is_valid = false;
   TimeLevel matrix_level;
 

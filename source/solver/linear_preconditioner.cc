@@ -1,0 +1,292 @@
+#include "linear_preconditioner.h"
+
+#include <peat/base/error.h>
+
+#include <EpetraExt_MatrixMatrix.h>
+#include <Epetra_Import.h>
+#include <Teuchos_ParameterList.hpp>
+#include <ml_MultiLevelPreconditioner.h>
+
+#include <cmath>
+
+namespace peat {
+using BlockMatrix = LinearSolver::BlockMatrix;
+using BlockVector = LinearSolver::BlockVector;
+
+namespace {
+Teuchos::ParameterList multigrid_settings()
+{
+  Teuchos::ParameterList list;
+  ML_Epetra::SetDefaults("SA", list);
+  list.set("ML output", 0);
+  list.set("aggregation: type", "Uncoupled");
+  list.set("smoother: type", "Chebyshev");
+  list.set("smoother: sweeps", 3);
+  list.set("coarse: type", "Amesos-KLU");
+  list.set("coarse: max size", 1000);
+  return list;
+}
+
+/// a A + b B for matrices of different patterns but the same maps.
+void sum(TrilinosMatrix &result, const TrilinosMatrix &A, const double a, const TrilinosMatrix &B, const double b)
+{
+  Epetra_CrsMatrix *total = nullptr;
+  EpetraExt::MatrixMatrix::Add(A.trilinos_matrix(), false, a, B.trilinos_matrix(), false, b, total);
+  const std::unique_ptr<Epetra_CrsMatrix> owner(total);
+  total->FillComplete(A.trilinos_matrix().DomainMap(), A.trilinos_matrix().RangeMap());
+  result.reinit(*total);
+}
+
+/// Constrained rows hold a diagonal of any sign: multigrid wants it positive.
+void make_diagonal_positive(TrilinosMatrix &matrix)
+{
+  const TrilinosVector diagonal = absolute_diagonal(matrix);
+  const auto range = matrix.local_range();
+  for (auto row = range.first; row < range.second; ++row)
+    matrix.set(row, row, diagonal(row));
+  matrix.compress(dealii::VectorOperation::insert);
+}
+
+/// target -= matrix * vector
+void subtract(TrilinosVector &target, const TrilinosMatrix &matrix, TrilinosVector &vector)
+{
+  vector *= -1.;
+  matrix.vmult_add(target, vector);
+  vector *= -1.;
+}
+
+TrilinosVector inverse(const TrilinosVector &vector)
+{
+  TrilinosVector result(vector);
+  for (unsigned int i = 0; i < result.locally_owned_size(); ++i)
+    result.trilinos_vector()[0][i] = 1. / vector.trilinos_vector()[0][i];
+  return result;
+}
+} // namespace
+
+TrilinosVector absolute_diagonal(const TrilinosMatrix &matrix)
+{
+  TrilinosVector result(matrix.locally_owned_range_indices(), matrix.get_mpi_communicator());
+  Epetra_Vector diagonal(matrix.trilinos_matrix().RowMap());
+  matrix.trilinos_matrix().ExtractDiagonalCopy(diagonal);
+  for (int i = 0; i < diagonal.MyLength(); ++i)
+    result.trilinos_vector()[0][i] = diagonal[i] == 0. ? 1. : std::abs(diagonal[i]);
+  return result;
+}
+
+TrilinosVector diagonal_of_product(const TrilinosMatrix &C, const TrilinosVector &diagonal_of_A)
+{
+  const Epetra_CrsMatrix &matrix = C.trilinos_matrix();
+  Epetra_Vector of_columns(matrix.ColMap());
+  if (matrix.Importer())
+    of_columns.Import(diagonal_of_A.trilinos_vector(), *matrix.Importer(), Insert);
+  else
+    of_columns = *diagonal_of_A.trilinos_vector()(0);
+  TrilinosVector result(C.locally_owned_range_indices(), C.get_mpi_communicator());
+  for (int row = 0; row < matrix.NumMyRows(); ++row) {
+    int length, *columns;
+    double *values, total = 0.;
+    matrix.ExtractMyRowView(row, length, values, columns);
+    for (int k = 0; k < length; ++k)
+      total += values[k] * values[k] / of_columns[columns[k]];
+    result.trilinos_vector()[0][row] = total;
+  }
+  return result;
+}
+
+std::vector<double> rigid_body_modes(const DisplacementUnknowns &unknowns)
+{
+  const unsigned int dim = unknowns.dim, n_rotations = dim == 2 ? 1 : 3;
+  const std::size_t n = unknowns.positions.size();
+  dealii::Point<3> middle;
+  for (const auto &x : unknowns.positions)
+    middle += (x - dealii::Point<3>()) / double(n);
+  std::vector<double> modes((dim + n_rotations) * n, 0.);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!unknowns.fixed.empty() && unknowns.fixed[i])
+      continue;
+    const auto x = unknowns.positions[i] - middle;
+    const unsigned int component = unknowns.components[i];
+    modes[component * n + i] = 1.;
+    for (unsigned int r = 0; r < n_rotations; ++r) {
+      const unsigned int axis = dim == 2 ? 2 : r, first = (axis + 1) % 3, second = (axis + 2) % 3;
+      if (component == first)
+        modes[(dim + r) * n + i] = -x[second];
+      else if (component == second)
+        modes[(dim + r) * n + i] = x[first];
+    }
+  }
+  return modes;
+}
+
+void Multigrid::build(const TrilinosMatrix &matrix, const unsigned int n_components)
+{
+  Teuchos::ParameterList list = multigrid_settings();
+  list.set("PDE equations", int(n_components));
+  amg.initialize(matrix, list);
+}
+
+void Multigrid::build(const TrilinosMatrix &matrix, const unsigned int dim, const std::vector<double> &modes)
+{
+  Teuchos::ParameterList list = multigrid_settings();
+  list.set("PDE equations", int(dim));
+  list.set("null space: type", "pre-computed");
+  list.set("null space: add default vectors", false);
+  list.set("null space: dimension", int(dim == 2 ? 3 : 6));
+  // ML takes a plain pointer and only reads from it; a rank without unknowns still needs one.
+  static double nothing = 0.;
+  list.set("null space: vectors", modes.empty() ? &nothing : const_cast<double *>(modes.data()));
+  amg.initialize(matrix, list);
+}
+
+void SchurInverse::build(const BlockMatrix &matrix, const PreconditionerData &data)
+{
+  const TrilinosMatrix &D = matrix.block(1, 1);
+  if (data.pressure_mass)
+    sum(stiff, *data.pressure_mass, 1., D, -1.);
+  else {
+    stiff.copy_from(D);
+    stiff *= -1.;
+  }
+  make_diagonal_positive(stiff);
+  stiff_inverse.build(stiff, 1);
+  has_inertia = data.inertia != nullptr;
+  if (has_inertia) {
+    TrilinosMatrix product;
+    matrix.block(1, 0).mmult(product, matrix.block(0, 1), inverse(*data.inertia));
+    sum(inert, product, 1., D, -1.);
+    make_diagonal_positive(inert);
+    inert_inverse.build(inert, 1);
+  }
+  scratch.reinit(stiff.locally_owned_range_indices(), stiff.get_mpi_communicator());
+}
+
+void SchurInverse::vmult(TrilinosVector &result, const TrilinosVector &source) const
+{
+  stiff_inverse.vmult(result, source);
+  if (has_inertia) {
+    inert_inverse.vmult(scratch, source);
+    result += scratch;
+  }
+}
+
+void BlockOperator::vmult(BlockVector &result, const BlockVector &source) const
+{
+  if (!data.shear) {
+    matrix.vmult(result, source);
+    return;
+  }
+  const unsigned int last = source.n_blocks() - 1;
+  data.shear->vmult(result.block(0), source.block(0));
+  if (last == 2) {
+    matrix.block(0, 1).vmult_add(result.block(0), source.block(1));
+    matrix.block(1, 0).vmult(result.block(1), source.block(0));
+    matrix.block(1, 1).vmult_add(result.block(1), source.block(1));
+  }
+  data.gradient->vmult_add(result.block(0), source.block(last));
+  // G^T u - W pi
+  result.block(last) = source.block(last);
+  result.block(last).scale(*data.volumetric_compliance);
+  result.block(last) *= -1.;
+  data.gradient->Tvmult_add(result.block(last), source.block(0));
+}
+
+void VolumetricInverse::build(const PreconditionerData &data)
+{
+  const TrilinosVector &W = *data.volumetric_compliance, &F = *data.shear_compliance;
+  scratch = W;
+  scratch += F;
+  stiff_inverse = inverse(scratch);
+  has_inertia = data.inertia != nullptr;
+  if (!has_inertia)
+    return;
+  share = F;
+  share.scale(stiff_inverse);
+  data.gradient->Tmmult(inert, *data.gradient, inverse(*data.inertia));
+  const auto range = inert.local_range();
+  for (auto row = range.first; row < range.second; ++row)
+    inert.add(row, row, W(row) * share(row));
+  inert.compress(dealii::VectorOperation::add);
+  inert_inverse.build(inert, data.n_psi_per_cell);
+}
+
+void VolumetricInverse::vmult(TrilinosVector &result, const TrilinosVector &source) const
+{
+  if (has_inertia) {
+    scratch = source;
+    scratch.scale(share);
+    inert_inverse.vmult(result, scratch);
+    result.scale(share);
+    scratch = source;
+    scratch.scale(stiff_inverse);
+    result += scratch;
+  } else {
+    result = source;
+    result.scale(stiff_inverse);
+  }
+}
+
+BlockPreconditioner::BlockPreconditioner(const DisplacementUnknowns &unknowns)
+    : dim(unknowns.dim), modes(rigid_body_modes(unknowns))
+{}
+
+void BlockPreconditioner::build(const BlockMatrix &new_matrix, const PreconditionerData &new_data)
+{
+  matrix = &new_matrix;
+  data = new_data;
+  const TrilinosMatrix &stiffness = data.shear ? *data.shear : matrix->block(0, 0);
+  displacement.build(stiffness, dim, modes);
+  if (data.shear)
+    volumetric.build(data);
+  if (matrix->n_block_rows() == 2)
+    schur.build(*matrix, data);
+  if (data.shear && matrix->n_block_rows() == 2) {
+    p_scratch.reinit(matrix->block(1, 1).locally_owned_range_indices(), matrix->get_mpi_communicator());
+    psi_scratch = projected = *data.volumetric_compliance;
+  }
+  u_scratch.reinit(stiffness.locally_owned_range_indices(), stiffness.get_mpi_communicator());
+}
+
+void BlockPreconditioner::vmult(BlockVector &result, const BlockVector &source) const
+{
+  const bool has_pressure = matrix->n_block_rows() == 2, mixed = data.shear != nullptr;
+  u_scratch = source.block(0);
+  if (mixed && has_pressure)
+    solve_pressures(result, source);
+  else if (has_pressure) {
+    schur.vmult(result.block(1), source.block(1));
+    result.block(1) *= -1.;
+  } else if (mixed) {
+    volumetric.vmult(result.block(1), source.block(1));
+    result.block(1) *= -1.;
+  }
+  // u = A^-1 (f_u - B p - G pi)
+  if (has_pressure)
+    subtract(u_scratch, matrix->block(0, 1), result.block(1));
+  if (mixed)
+    subtract(u_scratch, *data.gradient, result.block(result.n_blocks() - 1));
+  displacement.vmult(result.block(0), u_scratch);
+}
+
+void BlockPreconditioner::solve_pressures(BlockVector &result, const BlockVector &source) const
+{
+  const TrilinosVector &f = source.block(2);
+  TrilinosVector &p = result.block(1), &pi = result.block(2);
+  // f_p + P^T (f_pi - W V f_pi)
+  volumetric.vmult(pi, f);
+  psi_scratch = pi;
+  psi_scratch.scale(*data.volumetric_compliance);
+  psi_scratch.sadd(-1., f);
+  data.projection->Tvmult(p_scratch, psi_scratch);
+  p_scratch += source.block(1);
+  schur.vmult(p, p_scratch);
+  p *= -1.;
+  // pi = P p - V (f_pi + W P p)
+  data.projection->vmult(projected, p);
+  psi_scratch = projected;
+  psi_scratch.scale(*data.volumetric_compliance);
+  psi_scratch += f;
+  volumetric.vmult(pi, psi_scratch);
+  pi.sadd(-1., projected);
+}
+} // namespace peat
