@@ -106,6 +106,7 @@ void Simulation<dim>::run_static_stage(const StageParameters &stage, const doubl
   balances = std::make_unique<Balances<dim>>(totals(scene, communicator));
   log.line("stage '" + stage.name + "': static state, " + how + ", " + std::to_string(unknowns_of_solver()) +
            " unknowns");
+  report_work();
   steps.add(0.);
   wall.time_loop += seconds() - clock;
   report(now, true);
@@ -140,6 +141,21 @@ void Simulation<dim>::run_implicit_stage(const StageParameters &stage, const dou
     log.progress(now / planned_end, now, steps.n_steps,
                  steps.n_steps * double(scene.n_global_points()) / std::max(1e-9, wall.time_loop));
   }
+  report_work();
+}
+
+template <int dim>
+void Simulation<dim>::report_work() const
+{
+  const auto &work = up_solver->work();
+  std::ostringstream text;
+  text << work.newton_iterations << " Newton iterations, " << work.linear_solves << " linear systems of "
+       << up_solver->space().n_unknowns() << " unknowns";
+  if (work.linear_solves > 0)
+    text << " with " << double(work.linear_iterations) / work.linear_solves << " iterations each";
+  if (work.rejected_steps > 0)
+    text << ", " << work.rejected_steps << " steps repeated with shorter ones";
+  log.line(text.str());
 }
 
 template <int dim>

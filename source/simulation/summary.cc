@@ -53,6 +53,11 @@ void Simulation<dim>::write_summary() const
   summary["active_cells"] = active_cells;
   summary["dofs"] = unknowns_of_solver() > 0 ? unknowns_of_solver() : n_owned_nodes * dim;
   summary["steps"] = steps.n_steps;
+  if (up_solver)
+    summary["iterations"] = {{"newton", up_solver->work().newton_iterations},
+                             {"linear_systems", up_solver->work().linear_solves},
+                             {"linear", up_solver->work().linear_iterations},
+                             {"rejected_steps", up_solver->work().rejected_steps}};
   summary["simulated_time"] = number(now);
   summary["dt"] = {{"min", number(steps.smallest)},
                    {"max", number(steps.largest)},

@@ -70,6 +70,7 @@ private:
   void begin_stage(const StageParameters &stage, const StableStep &step);
   void make_up_solver(typename UpSolver<dim>::Method method, double start);
   unsigned long unknowns_of_solver() const;
+  void report_work() const;
   void report(double time, bool everything);
   void write_summary() const;
   std::vector<typename Comparison<dim>::Result> compare_with_references() const;
@@ -86,7 +87,7 @@ private:
   Comparison<dim> comparison;
   Recorder<dim> *const recorder;
   const std::string directory;
-  Log log;
+  mutable Log log;
   std::unique_ptr<Solver<dim>> solver;
   UpSolver<dim> *up_solver = nullptr; ///< the same, if it is one
   SchemeParameters stage_scheme;

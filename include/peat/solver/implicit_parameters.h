@@ -19,7 +19,7 @@ struct ImplicitParameters
   double spectral_radius = 0.8; ///< of generalised-alpha at infinity
   unsigned int start_steps = 2; ///< of dynamics that are taken as two steps of backward Euler each
   double first_step = 0.;       ///< quasi-static [s]; 0: automatic
-  double step_tolerance = 1e-3; ///< quasi-static: error of a step
+  double step_tolerance = 3e-3; ///< quasi-static: error of a step
   double largest_growth = 3.;   ///< of quasi-static steps
 
   double newton_tolerance = 1e-9;
