@@ -1,0 +1,179 @@
+#!/usr/bin/env python3
+"""Run the scenes of prm/verification with finite elements, and with material points in implicit steps.
+
+    fem_scenes.py --peat build/peat --case NAME [--ranks N] [--keep DIR]
+    fem_scenes.py --list quick|full
+
+Bounds are those of the scenes' parameter files, where they are explained; a bound that differs says why beside it.
+"""
+import os
+import sys
+
+import scenes
+from scenes import TABLES, interpolate, least_squares, read_table
+from math import atan2, cos, hypot, pi, sin
+
+FEM = {"Method": "fem"}
+STEADY = {"Stages/consolidation/Solver": "quasi-static"}
+# Name, settings: the discretisations of the implicit solvers.
+DISCRETE = (("taylor-hood", dict(FEM)), ("q1", dict(FEM, **{"Implicit solver/Element": "q1"})),
+            ("points, gimp", {"Method": "mpm"}), ("points, q1", {"Method": "mpm", "Explicit MPM/Basis": "q1"}))
+
+
+def settled(c, scene, displacement, end, sizes=(10, 20, 40)):
+    for name, method in DISCRETE:
+        settings = dict(method, **STEADY)
+        run = c.run(scene, settings)
+        c.below(name + ": pressure (rms over cells, all times)", run.error("pressure", "L2"), 3e-3)
+        c.below(name + ": displacement, Linf", run.error(displacement, "Linf"), 5e-3)
+        # Steps short enough that what is left is the error of space.
+        runs = [c.run(scene, dict(settings, **{"Constants/cells": n, "Implicit solver/Step tolerance": 1e-4}))
+                for n in sizes]
+        c.order(name + ": pressure at the end", sizes, [r.errors_at_times("pressure")[-1] for r in runs], 1.8)
+    return runs
+
+
+def p1(c):
+    settled(c, "P1_terzaghi", "settlement", 0.2)
+    run = c.run("P1_terzaghi", dict(FEM, **STEADY, **{
+        "Constants/End": "2*t_1", "Constants/cells": 20, "Implicit solver/Step tolerance": 3e-3}))
+    c.below("steps to T = 2 with a tolerance of 3e-3", run.summary["steps"], 59)
+    c.below("pressure then (rms over cells, all times)", run.error("pressure", "L2"), 1e-2)
+    c.below("settlement then, Linf", run.error("settlement", "Linf"), 1e-2)
+
+
+def p2(c):
+    settled(c, "P2_selfweight_consolidation", "displacement", 0.02)
+
+
+def p3(c):
+    for name, method in DISCRETE[:3]:
+        run = c.run("P3_two_layer", method)
+        c.below(name + ": pressure (rms over cells, all times)", run.error("pressure", "L2"), 5e-3)
+        c.below(name + ": settlement, Linf", run.error("settlement", "Linf"), 5e-3)
+        c.below(name + ": pressure at the base, Linf", run.error("pressure at the base", "Linf"), 5e-3)
+
+
+def p4(c, cells=20):
+    table = read_table(os.path.join(TABLES, "P4_mandel_history.csv"))
+    t, exact = table["t [s]"], table["p(0) [Pa]"]
+    p0 = exact[0] / table["p(0)/p0 [-]"][0]
+    for name, method, bound in (("taylor-hood", FEM, 5e-3), ("points", {"Method": "mpm"}, 2e-2)):
+        run = c.run("P4_mandel", dict(method, **{"Constants/cells": cells}))
+        c.below(name + ": pressure in the middle, Linf", run.error("pressure in the middle", "Linf"), bound)
+        c.below(name + ": motion of the side, Linf", run.error("motion of the side", "Linf"), bound)
+        probes = run.table("probes.csv")
+        p = probes["middle/pressure"]
+        c.below(name + ": largest pressure over p0", abs(max(p) - max(exact)) / p0, 3e-3 if method is FEM else bound)
+        found, known = probes["time"][p.index(max(p))], t[exact.index(max(exact))]
+        c.report(name + ": its time over that of the series", "%.3f" % (found / known))
+
+
+def p5(c, cells, method, pressure, displacement):
+    run = c.run("P5_strip", dict(method, **{"Constants/cells": cells}))
+    for name in run.summary["errors"]:
+        c.below(name + ", Linf over time", run.error(name, "Linf"), pressure if name.startswith("pressure") else displacement)
+
+
+def d1(c, omegas=(50, 500)):
+    table = read_table(os.path.join(TABLES, "D1_harmonic.csv"))
+    rows = list(zip(*(table[k] for k in table)))
+    for form, inertia in ((0, "true"), (1, "false")):
+        for omega in omegas:
+            run = c.run("D1_harmonic", {"Constants/omega": omega, "Seepage inertia": inertia})
+            probes = run.table("probes.csv")
+            name = "%s, omega = %g: " % (("up", "up0")[form], omega)
+            begin = 12. * 2. * pi / omega
+            keep = [i for i, t in enumerate(probes["time"]) if t >= begin * (1. - 1e-9)]
+            t = [probes["time"][i] for i in keep]
+            # A slow rest of the start is still there: a parabola in two periods.
+            s = [(v - t[0]) / (t[-1] - t[0]) for v in t]
+            basis = [[cos(omega * v) for v in t], [sin(omega * v) for v in t], [1.] * len(t), s, [v * v for v in s]]
+            known = [r for r in rows if r[0] == omega and r[1] == form]
+            for probe, z, column, k in (("base", 0., "pressure", 5), ("quarter", 2.5, "pressure", 5),
+                                        ("middle", 5., "pressure", 5), ("high", 7.5, "pressure", 5),
+                                        ("top", 10., "displacement y", 3)):
+                y = [probes["%s/%s" % (probe, column)][i] for i in keep]
+                (a, b), scale = least_squares(basis, y)[0][:2], max(r[k] for r in known)
+                r = next(r for r in known if r[2] == z)
+                # The load is q sin(omega t) = Im(q exp(i omega t)).
+                c.below(name + "amplitude of the %s, %s" % (column, probe), abs(hypot(a, b) - r[k]) / scale, 1e-2)
+                c.below(name + "phase", abs((atan2(a, b) - r[k + 1] + pi) % (2. * pi) - pi), 2e-2)
+
+
+def d2(c):
+    run = c.run("D2_step", FEM)
+    for name in ("pressure at the base", "pressure in the middle", "displacement of the top"):
+        c.below(name + ", L1", run.error(name, "L1"), 5e-2)
+
+
+def d3(c, sizes=(10, 20, 40)):
+    runs = [c.run("D3_ramp", dict(FEM, **{"Constants/cells": n})) for n in sizes]
+    c.below("pressure (rms over cells, all times)", runs[-1].error("pressure", "L2"), 1e-2)
+    c.below("displacement of the top for t >= 0.1 s, Linf", runs[-1].error("displacement of the top", "Linf"), 1e-2)
+    c.below("pressure at the base, Linf", runs[-1].error("pressure at the base", "Linf"), 1e-2)
+    c.order("pressure at the base", sizes, [r.error("pressure at the base", "L2") for r in runs], 1.8)
+
+
+def d5(c, sizes=(10, 20, 40)):
+    exact, errors = scenes.d5_eigenvalues("up"), []
+    for n in sizes:
+        run = c.run("D5_standing_wave", dict(FEM, **{"Constants/cells": n, "Implicit solver/Start steps": 0,
+                                                     "Implicit solver/Time step": 6e-4 / n}))
+        p = run.table("probes.csv")
+        errors.append([abs(a / b - 1.) for a, b in zip(scenes.fit_decay(p["time"], p["middle/velocity y"], exact), exact)])
+    c.below("imaginary part at 40 cells a wave length", errors[1][1], 2e-3)
+    c.below("real part", errors[1][0], 2e-2)
+    c.order("imaginary part", sizes, [e[1] for e in errors], 1.8)
+
+
+def d6(c, cells, method, bound):
+    run = c.run("D6_strip_pulse", dict(method, **{"Constants/cells": cells}))
+    for name in run.summary["errors"]:
+        c.below(name + ", Linf over time", run.error(name, "Linf"), bound)
+
+
+def d7(c):
+    sizes = (8, 16, 32)
+    for element, order in (("taylor-hood", 3), ("q1", 2)):
+        # Second order in time, h^1.5 a step: as good as the third in space.
+        runs = [c.run("D7_manufactured", {"Constants/cells": n, "Implicit solver/Element": element}) for n in sizes]
+        for name, expected in (("displacement x", order), ("displacement y", order), ("velocity x", 2), ("pressure", 2)):
+            c.order("%s: %s, L2" % (element, name), sizes, [r.error(name, "L2") for r in runs], expected - 0.2)
+
+
+def g1(c):
+    for h_w in (0, 3):
+        for name, method, bound in (("taylor-hood", FEM, 1e-6), ("points", {"Method": "mpm"}, 1e-2)):
+            run = c.run("G1_gravity", dict(method, **{"Constants/h_w": h_w}))
+            for field in ("displacement", "pressure", "vertical stress", "horizontal stress"):
+                c.below("%s, h_w = %g: %s, Linf" % (name, h_w, field), run.error(field, "Linf"), bound)
+    run = c.run("G1_rest", FEM)
+    c.below("start from the exact state: displacement over height", run.error("displacement", "Linf"), 1e-6)
+    c.below("start from the exact state: pressure", run.error("pressure", "Linf"), 1e-6)
+
+
+MPM = {"Method": "mpm"}
+# name: (function, labels, seconds on one core)
+CASES = {
+    "fem_P1": (p1, ("quick", "full"), 20),
+    "fem_P2": (p2, ("quick", "full"), 15),
+    "fem_P3": (p3, ("quick", "full"), 8),
+    "fem_P4": (p4, ("full",), 35),
+    # At h = b/4, four times the error of b/8.
+    "fem_P5_coarse": (lambda c: p5(c, 4, FEM, 2e-2, 1.2e-2), ("quick", "full"), 9),
+    "fem_P5": (lambda c: p5(c, 8, FEM, 5e-3, 3e-3), ("full",), 60),
+    "fem_P5_points": (lambda c: p5(c, 16, MPM, 2e-2, 1e-2), ("full",), 300),
+    "fem_D1": (d1, ("quick", "full"), 20),
+    "fem_D2": (d2, ("quick", "full"), 2),
+    "fem_D3": (d3, ("quick", "full"), 8),
+    "fem_D5": (d5, ("quick", "full"), 8),
+    "fem_D6": (lambda c: d6(c, 8, FEM, 1e-2), ("full",), 300),
+    "fem_D6_points": (lambda c: d6(c, 16, MPM, 5e-2), ("full",), 300),
+    "fem_D7": (d7, ("quick", "full"), 20),
+    "fem_G1": (g1, ("quick", "full"), 5),
+}
+
+if __name__ == "__main__":
+    scenes.CASES = CASES
+    sys.exit(scenes.main())
