@@ -135,11 +135,14 @@ def d6(c, cells, method, bound):
 
 def d7(c):
     sizes = (8, 16, 32)
-    for element, order in (("taylor-hood", 3), ("q1", 2)):
+    # Where pressures diffuse fast (k = 1e-2 m/s) their own error, h^2, also drives the displacements, whose order falls from
+    # 3 towards 2 (measured: 2.5; 2.9 with a pressure thirty times smaller). At k = 1e-5 m/s it does not.
+    for element, k, order in (("taylor-hood", 1e-5, 3), ("taylor-hood", 1e-2, 2.5), ("q1", 1e-2, 2)):
         # Second order in time, h^1.5 a step: as good as the third in space.
-        runs = [c.run("D7_manufactured", {"Constants/cells": n, "Implicit solver/Element": element}) for n in sizes]
+        runs = [c.run("D7_manufactured", {"Constants/cells": n, "Constants/k": k, "Implicit solver/Element": element})
+                for n in sizes]
         for name, expected in (("displacement x", order), ("displacement y", order), ("velocity x", 2), ("pressure", 2)):
-            c.order("%s: %s, L2" % (element, name), sizes, [r.error(name, "L2") for r in runs], expected - 0.2)
+            c.order("%s, k = %g: %s, L2" % (element, k, name), sizes, [r.error(name, "L2") for r in runs], expected - 0.2)
 
 
 def g1(c):
