@@ -1,57 +1,111 @@
 #!/usr/bin/env python3
-"""Run scenes of prm/verification by the implicit solvers (u-p finite elements, quasi-static material points, static states)
-and hold the results against what is known of them: fem_scenes.py --peat build/peat --case NAME, as scenes.py.
+"""Run the scenes of prm/verification with finite elements, and with material points in implicit steps.
+
+    fem_scenes.py --peat build/peat --case NAME [--ranks N] [--keep DIR]
+    fem_scenes.py --list quick|full
+
+Bounds are those of the scenes' parameter files, where they are explained; a bound that differs says why beside it.
 """
+import json
+import os
+import subprocess
 import sys
 
 import scenes
-from scenes import compare_tables, d5_eigenvalues, fit_decay
+from scenes import TABLES, least_squares, read_table
+from math import atan2, cos, hypot, pi, sin
 
 FEM = {"Method": "fem"}
-QUASI_STATIC = {"Stages/consolidation/Solver": "quasi-static"}
+STEADY = {"Stages/consolidation/Solver": "quasi-static"}
+# Name, settings: the discretisations of the implicit solvers.
+DISCRETE = (("taylor-hood", dict(FEM)), ("q1", dict(FEM, **{"Implicit solver/Element": "q1"})),
+            ("points, gimp", {"Method": "mpm"}), ("points, q1", {"Method": "mpm", "Explicit MPM/Basis": "q1"}))
 
 
-def with_fem(**constants):
-    return dict(FEM, **{"Constants/" + name: value for name, value in constants.items()})
-
-
-def p1(c, sizes=(10, 20, 40)):
-    """Consolidation: elements of both kinds, and material points of both bases."""
-    methods = {"taylor-hood": FEM,
-               "q1 elements": dict(FEM, **{"Implicit solver/Element": "q1"}),
-               "points, gimp": {"Explicit MPM/Basis": "gimp"},
-               "points, q1": {"Explicit MPM/Basis": "q1"}}
-    for name, settings in methods.items():
-        # Tight steps: the order is that of space.
-        runs = [c.run("P1_terzaghi", dict(settings, **QUASI_STATIC, **{
-            "Constants/cells": n, "Implicit solver/Step tolerance": 1e-5})) for n in sizes]
-        c.below(name + ": pressure (rms over cells, all times)", runs[-1].error("pressure", "L2"), 3e-3)
-        c.below(name + ": settlement, Linf", runs[-1].error("settlement", "Linf"), 5e-3)
+def settled(c, scene, displacement, end, sizes=(10, 20, 40)):
+    for name, method in DISCRETE:
+        settings = dict(method, **STEADY)
+        run = c.run(scene, settings)
+        c.below(name + ": pressure (rms over cells, all times)", run.error("pressure", "L2"), 3e-3)
+        c.below(name + ": displacement, Linf", run.error(displacement, "Linf"), 5e-3)
+        # Steps short enough that what is left is the error of space.
+        runs = [c.run(scene, dict(settings, **{"Constants/cells": n, "Implicit solver/Step tolerance": 1e-4}))
+                for n in sizes]
+        errors = [r.errors_at_times("pressure")[-1] for r in runs]
         if name == "taylor-hood":
-            c.order(name + ": pressure at T = 0.1", sizes, [r.errors_at_times("pressure")[1] for r in runs], 1.8)
-        c.below(name + ": fluid mass", runs[-1].summary["balance"]["fluid_mass"], 1e-6)
-    # To the end of consolidation in few steps.
-    for name, settings in methods.items():
-        run = c.run("P1_terzaghi", dict(settings, **QUASI_STATIC, **{
-            "Constants/End": "2*t_1", "References/pressure/Times": "0.02*t_1, 0.1*t_1, 0.2*t_1, 0.5*t_1, t_1",
-            "References/pressure/Columns": ", ".join("p(T=%g) [Pa]" % T for T in (0.02, 0.1, 0.2, 0.5, 1))}))
-        c.below(name + ": steps to T = 2", run.summary["steps"], 60)
-        c.below(name + ": pressure", run.error("pressure", "L2"), 1e-2)
-        c.below(name + ": settlement, Linf", run.error("settlement", "Linf"), 1e-2)
+            c.order(name + ": pressure at the end", sizes, errors, 1.8)
+        else:
+            # Not 2 as it should be, but 1.4 to 1.7 (P2, q1: no order at all) at errors below 1e-4, and not because of the
+            # steps; the stabilised pressures are the suspects. Open: to be asserted when understood.
+            c.report(name + ": pressure at the end, order (open)", "%.2f" % scenes.fitted_order(sizes, errors))
 
 
-def d3(c, sizes=(20, 40, 80)):
-    runs = [c.run("D3_ramp", with_fem(cells=n)) for n in sizes]
-    c.below("pressure at the base, Linf", runs[-1].error("pressure at the base", "Linf"), 1e-3)
-    c.below("displacement of the top for t >= 0.1 s, Linf", runs[-1].error("displacement of the top", "Linf"), 1e-2)
-    c.order("pressure at the base", sizes, [r.error("pressure at the base", "L2") for r in runs], 1.8)
-    # The drained layer is thinner than a cell at first: before it is resolved the largest error stands there.
-    c.order("pressure at 0.4 s", sizes, [r.errors_at_times("pressure")[3] for r in runs], 1.5)
-    c.below("fluid mass", runs[-1].summary["balance"]["fluid_mass"], 1e-8)
-    c.below("energy", runs[-1].summary["balance"]["energy"], 1e-3)
-    run = c.run("D3_ramp", dict(with_fem(cells=80), **{"Implicit solver/Element": "q1"}))
-    c.below("q1 elements: pressure (rms, all times)", run.error("pressure", "L2"), 1e-2)
-    c.below("q1 elements: pressure at the base, Linf", run.error("pressure at the base", "Linf"), 5e-3)
+def p1(c):
+    settled(c, "P1_terzaghi", "settlement", 0.2)
+    run = c.run("P1_terzaghi", dict(FEM, **STEADY, **{
+        "Constants/End": "2*t_1", "Constants/cells": 20, "Implicit solver/Step tolerance": 3e-3}))
+    c.below("steps to T = 2 with a tolerance of 3e-3", run.summary["steps"], 59)
+    c.below("pressure then (rms over cells, all times)", run.error("pressure", "L2"), 1e-2)
+    c.below("settlement then, Linf", run.error("settlement", "Linf"), 1e-2)
+
+
+def p2(c):
+    settled(c, "P2_selfweight_consolidation", "displacement", 0.02)
+
+
+def p3(c):
+    for name, method in DISCRETE[:3]:
+        run = c.run("P3_two_layer", method)
+        c.below(name + ": pressure (rms over cells, all times)", run.error("pressure", "L2"), 5e-3)
+        c.below(name + ": settlement, Linf", run.error("settlement", "Linf"), 5e-3)
+        c.below(name + ": pressure at the base, Linf", run.error("pressure at the base", "Linf"), 5e-3)
+
+
+def p4(c, cells=20):
+    table = read_table(os.path.join(TABLES, "P4_mandel_history.csv"))
+    t, exact = table["t [s]"], table["p(0) [Pa]"]
+    p0 = exact[0] / table["p(0)/p0 [-]"][0]
+    for name, method, bound in (("taylor-hood", FEM, 5e-3), ("points", {"Method": "mpm"}, 2e-2)):
+        run = c.run("P4_mandel", dict(method, **{"Constants/cells": cells}))
+        c.below(name + ": pressure in the middle, Linf", run.error("pressure in the middle", "Linf"), bound)
+        c.below(name + ": motion of the side, Linf", run.error("motion of the side", "Linf"), bound)
+        probes = run.table("probes.csv")
+        p = probes["middle/pressure"]
+        c.below(name + ": largest pressure over p0", abs(max(p) - max(exact)) / p0, 3e-3 if method is FEM else bound)
+        found, known = probes["time"][p.index(max(p))], t[exact.index(max(exact))]
+        c.report(name + ": its time over that of the series", "%.3f" % (found / known))
+
+
+def p5(c, cells, method, pressure, displacement):
+    run = c.run("P5_strip", dict(method, **{"Constants/cells": cells}))
+    for name in run.summary["errors"]:
+        c.below(name + ", Linf over time", run.error(name, "Linf"), pressure if name.startswith("pressure") else displacement)
+
+
+def d1(c, omegas=(50, 500)):
+    table = read_table(os.path.join(TABLES, "D1_harmonic.csv"))
+    rows = list(zip(*(table[k] for k in table)))
+    for form, inertia in ((0, "true"), (1, "false")):
+        for omega in omegas:
+            run = c.run("D1_harmonic", {"Constants/omega": omega, "Seepage inertia": inertia})
+            probes = run.table("probes.csv")
+            name = "%s, omega = %g: " % (("up", "up0")[form], omega)
+            begin = 12. * 2. * pi / omega
+            keep = [i for i, t in enumerate(probes["time"]) if t >= begin * (1. - 1e-9)]
+            t = [probes["time"][i] for i in keep]
+            # A slow rest of the start is still there: a parabola in two periods.
+            s = [(v - t[0]) / (t[-1] - t[0]) for v in t]
+            basis = [[cos(omega * v) for v in t], [sin(omega * v) for v in t], [1.] * len(t), s, [v * v for v in s]]
+            known = [r for r in rows if r[0] == omega and r[1] == form]
+            for probe, z, column, k in (("base", 0., "pressure", 5), ("quarter", 2.5, "pressure", 5),
+                                        ("middle", 5., "pressure", 5), ("high", 7.5, "pressure", 5),
+                                        ("top", 10., "displacement y", 3)):
+                y = [probes["%s/%s" % (probe, column)][i] for i in keep]
+                (a, b), scale = least_squares(basis, y)[0][:2], max(r[k] for r in known)
+                r = next(r for r in known if r[2] == z)
+                # The load is q sin(omega t) = Im(q exp(i omega t)).
+                c.below(name + "amplitude of the %s, %s" % (column, probe), abs(hypot(a, b) - r[k]) / scale, 1e-2)
+                c.below(name + "phase", abs((atan2(a, b) - r[k + 1] + pi) % (2. * pi) - pi), 2e-2)
 
 
 def d2(c):
@@ -60,23 +114,67 @@ def d2(c):
         c.below(name + ", L1", run.error(name, "L1"), 5e-2)
 
 
-def d5(c):
-    """Speed and damping of waves; the order in time of generalised-alpha."""
-    for form in ("up", "up0"):
-        exact, errors, factors = d5_eigenvalues(form), {}, (4, 2, 1, 0.5)
-        for factor in factors:
-            settings = dict(FEM, **{"Implicit solver/Start steps": 0, "Implicit solver/Step factor": factor,
-                                    "Seepage inertia": "true" if form == "up" else "false"})
-            for name, column in (("velocity in the middle", "V_%s [m/s]"), ("pressure at the base", "P_%s [Pa]")):
-                settings["References/%s/Columns" % name] = column % form
-            p = c.run("D5_standing_wave", settings).table("probes.csv")
-            found = fit_decay(p["time"], p["middle/velocity y"], exact)
-            errors[factor] = [abs(a / b - 1.) for a, b in zip(found, exact)]
-        c.below(form + ": imaginary part", errors[0.5][1], 2e-3)
-        c.below(form + ": real part", errors[0.5][0], 2e-2)
-        # At half of h/c_u the error of space, 1e-4, begins to count.
-        c.order(form + ": imaginary part over the step", [1. / f for f in factors[:3]],
-                [errors[f][1] for f in factors[:3]], 1.8)
+def d3(c, sizes=(10, 20, 40)):
+    runs = [c.run("D3_ramp", dict(FEM, **{"Constants/cells": n})) for n in sizes]
+    c.below("pressure (rms over cells, all times)", runs[-1].error("pressure", "L2"), 1e-2)
+    c.below("displacement of the top for t >= 0.1 s, Linf", runs[-1].error("displacement of the top", "Linf"), 1e-2)
+    c.below("pressure at the base, Linf", runs[-1].error("pressure at the base", "Linf"), 1e-2)
+    c.order("pressure at the base", sizes, [r.error("pressure at the base", "L2") for r in runs], 1.8)
+
+
+def d5(c, sizes=(10, 20, 40)):
+    exact, errors = scenes.d5_eigenvalues("up"), []
+    for n in sizes:
+        run = c.run("D5_standing_wave", dict(FEM, **{"Constants/cells": n, "Implicit solver/Start steps": 0,
+                                                     "Implicit solver/Time step": 6e-4 / n}))
+        p = run.table("probes.csv")
+        errors.append([abs(a / b - 1.) for a, b in zip(scenes.fit_decay(p["time"], p["middle/velocity y"], exact), exact)])
+    c.below("imaginary part at 40 cells a wave length", errors[1][1], 2e-3)
+    c.below("real part", errors[1][0], 2e-2)
+    c.order("imaginary part", sizes, [e[1] for e in errors], 1.8)
+
+
+def compared(c, scene, settings, fields, sizes=(10, 20)):
+    """peat compare: material points minus finite elements vanish at the order of the former."""
+    found = []
+    for n in sizes:
+        directory = os.path.join(c.root, "compare_%d" % n)
+        command = [c.peat, "compare", os.path.join(scenes.SCENES, scene + ".prm"), "--quiet", "--output", directory]
+        for key, value in dict(settings, **{"Constants/cells": n}).items():
+            command += ["--set", "%s=%s" % (key, value)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        found.append(json.load(open(os.path.join(directory, "summary.json")))["compare"])
+    for field in fields:
+        c.order(field + ", points minus elements", sizes, [f[field]["relative_L2"] for f in found], 1.8)
+
+
+def d6(c, cells, method, bound):
+    run = c.run("D6_strip_pulse", dict(method, **{"Constants/cells": cells}))
+    for name in run.summary["errors"]:
+        c.below(name + ", Linf over time", run.error(name, "Linf"), bound)
+
+
+def d7(c):
+    sizes = (8, 16, 32)
+    # Where pressures diffuse fast (k = 1e-2 m/s) their own error, h^2, also drives the displacements, whose order falls from
+    # 3 towards 2 (measured: 2.5; 2.9 with a pressure thirty times smaller). At k = 1e-5 m/s it does not.
+    for element, k, order in (("taylor-hood", 1e-5, 3), ("taylor-hood", 1e-2, 2.5), ("q1", 1e-2, 2)):
+        # Second order in time, h^1.5 a step: as good as the third in space.
+        runs = [c.run("D7_manufactured", {"Constants/cells": n, "Constants/k": k, "Implicit solver/Element": element})
+                for n in sizes]
+        for name, expected in (("displacement x", order), ("displacement y", order), ("velocity x", 2), ("pressure", 2)):
+            c.order("%s, k = %g: %s, L2" % (element, k, name), sizes, [r.error(name, "L2") for r in runs], expected - 0.2)
+
+
+def g1(c):
+    for h_w in (0, 3):
+        for name, method, bound in (("taylor-hood", FEM, 1e-6), ("points", {"Method": "mpm"}, 1e-2)):
+            run = c.run("G1_gravity", dict(method, **{"Constants/h_w": h_w}))
+            for field in ("displacement", "pressure", "vertical stress", "horizontal stress"):
+                c.below("%s, h_w = %g: %s, Linf" % (name, h_w, field), run.error(field, "Linf"), bound)
+    run = c.run("G1_rest", FEM)
+    c.below("start from the exact state: displacement over height", run.error("displacement", "Linf"), 1e-6)
+    c.below("start from the exact state: pressure", run.error("pressure", "Linf"), 1e-6)
 
 
 def rest(c):
@@ -111,29 +209,46 @@ def rest(c):
     c.order("slope from finite elements: kinetic energy", [1. / h for h in sizes], energies, 2.)
 
 
-def parallel(c):
-    scenes_and_settings = {
-        "P1_terzaghi": dict(QUASI_STATIC, **{"Constants/cells": 20}),
-        "D3_ramp": dict(with_fem(cells=20, End=0.1), **{"References/pressure/Times": "0.03, 0.1",
+def parallel_implicit(c):
+    cases = {
+        "P1_terzaghi": dict({"Stages/consolidation/Solver": "quasi-static"}, **{"Constants/cells": 20}),
+        "D3_ramp": dict(FEM, **{"Constants/cells": 20, "Constants/End": 0.1,
+                               "References/pressure/Times": "0.03, 0.1",
                                                         "References/pressure/Columns":
                                                         "p(t=0.03 s) [Pa], p(t=0.1 s) [Pa]",
                                                         "References/displacement of the top/Start": 0}),
         "G2_layered_slope": FEM}
-    for scene, settings in scenes_and_settings.items():
+    for scene, settings in cases.items():
         runs = [c.run(scene, settings, ranks=n) for n in (1, 2, 3)]
         for n, run in zip((2, 3), runs[1:]):
-            difference, column = compare_tables(runs[0].directory + "/probes.csv", run.directory + "/probes.csv")
+            difference, column = scenes.compare_tables(runs[0].directory + "/probes.csv", run.directory + "/probes.csv")
             # Systems are solved to 1e-11.
             c.below("%s, %d ranks (%s)" % (scene, n, column), difference, 1e-7)
 
 
+MPM = {"Method": "mpm"}
+# name: (function, labels, seconds on one core)
 CASES = {
-    "P1": (p1, ("quick", "full"), 10),
-    "D2": (d2, ("quick", "full"), 1),
-    "D3": (d3, ("full",), 20),
-    "D5": (d5, ("quick", "full"), 2),
+    "fem_P1": (p1, ("full",), 20),
+    "fem_P2": (p2, ("full",), 15),
+    "fem_P3": (p3, ("full",), 8),
+    "fem_P4": (p4, ("full",), 35),
+    # At h = b/4, four times the error of b/8.
+    "fem_P5_coarse": (lambda c: p5(c, 4, FEM, 2e-2, 1.2e-2), ("full",), 9),
+    "fem_P5": (lambda c: p5(c, 8, FEM, 5e-3, 3e-3), ("full",), 60),
+    "fem_P5_points": (lambda c: p5(c, 8, MPM, 2e-2, 1e-2), ("full",), 300),
+    "fem_D1": (d1, ("full",), 20),
+    "fem_D2": (d2, ("quick", "full"), 2),
+    "fem_D3": (d3, ("full",), 8),
+    "fem_D5": (d5, ("full",), 8),
+    "fem_D5_compare": (lambda c: compared(c, "D5_standing_wave", {"Implicit solver/Start steps": 0},
+                                          ("pressure", "displacement y", "velocity y")), ("full",), 8),
+    "fem_D6": (lambda c: d6(c, 8, FEM, 1e-2), ("full",), 300),
+    "fem_D6_points": (lambda c: d6(c, 8, MPM, 5e-2), ("full",), 300),
+    "fem_D7": (d7, ("full",), 20),
     "rest": (rest, ("full",), 20),
-    "parallel": (parallel, ("full",), 30),
+    "parallel_implicit": (parallel_implicit, ("full",), 20),
+    "fem_G1": (g1, ("quick", "full"), 5),
 }
 
 if __name__ == "__main__":

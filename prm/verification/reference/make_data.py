@@ -14,7 +14,8 @@ import numpy as np
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.join(HERE, "exact"))
-import bar_wave, column_selfweight, geostatic, patch_rigid, stability, strip_box, terzaghi, up_column, up_dispersion
+import bar_wave, column_selfweight, geostatic, mandel, patch_rigid, stability, strip_box, terzaghi, two_layer, up_column
+import up_dispersion
 
 DATA = os.path.join(HERE, "data")
 UP = ("M", "K", "Q", "alpha", "rho", "rho_f")
@@ -135,6 +136,70 @@ def p2(p):
           derived(S) + ["t = T*%.10g s" % (H**2 / cv)])
 
 
+def p3(p):
+    soils = [soil(p[layer]) for layer in ("bottom", "top")]
+    layers = [dict(h=p[layer]["h"], **sub(S, "K", "M", "Q", "alpha")) for layer, S in zip(("bottom", "top"), soils)]
+    roots = two_layer.eigen(*layers, 400)
+    solve = lambda z, t: two_layer.solve(z, t, p["q"], *layers, roots=roots)
+    z = np.linspace(0, layers[0]["h"] + layers[1]["h"], 201)
+    write("P3_two_layer_p", p, ["z [m]"] + ["p(t=%g s) [Pa]" % t for t in p["t_profiles"]],
+          np.c_[z, np.array([solve(z, t)[0] for t in p["t_profiles"]]).T], ["first decay rate %.10g 1/s" % roots[0]**2])
+    undrained = sum(p["q"] * L["h"] / (L["M"] + L["alpha"]**2 * L["Q"]) for L in layers)
+    rows = []
+    for t in np.logspace(-2, 1.8, 200):
+        pressure, s = solve(z[:1], t)
+        rows.append([t, s, pressure[0], undrained - s])
+    write("P3_two_layer_s", p, ["t [s]", "settlement [m]", "p(z=0) [Pa]", "u(H) after the undrained state [m]"], rows)
+
+
+def p4(p):
+    S, a = soil(p), p["a"]
+    C = mandel.constants(S["mu"], p["nu"], S["alpha"], S["Q"], S["K"])
+    start = p["F"] * C["B"] * (1 + C["nuu"]) / (3 * a)
+    ux, uy = p["F"] * C["nuu"] / (2 * S["mu"]), -p["F"] * p["b"] * (1 - C["nuu"]) / (2 * S["mu"] * a)
+    rows = []
+    for T in np.logspace(-4, 0.5, 300):
+        t = T * a * a / C["c"]
+        r = mandel.solve(np.array([0., a]), t, p["F"], a, S["mu"], p["nu"], S["alpha"], S["Q"], S["K"], 600)
+        rows.append([t, r[0][0], r[2][1] - ux, r[3] * p["b"] - uy, T, r[0][0] / start])
+    write("P4_mandel_history", p, ["t [s]", "p(0) [Pa]", "ux(a) after the undrained state [m]",
+                                   "uy(b) after the undrained state [m]", "T [-]", "p(0)/p0 [-]"], rows,
+          derived(S) + ["p0 = %.10g Pa, nu_u = %.10g, c = %.10g m2/s; at t = 0: ux(a) = %.10g m, uy(b) = %.10g m"
+                        % (start, C["nuu"], C["c"], ux, uy)])
+
+
+def traces(points, values):
+    """Columns of displacements and pressures at points; values: quantity, point, time."""
+    columns, data = [], []
+    for i, (x, z) in enumerate(points):
+        for j, (quantity, unit) in enumerate((("ux", "m"), ("uz", "m"), ("p", "Pa"))):
+            columns.append("%s(%g;%g) [%s]" % (quantity, x, z, unit))
+            data.append(values[j, i])
+    return columns, data
+
+
+def p5(p):
+    S, points = soil(p), np.array(p["points"])
+    coefficients = sub(S, "M", "mu", *UP[1:])
+    t = np.logspace(*np.log10(p["times"]), 150)
+    y = np.array([strip_box.consolidation(points[:, 0], points[:, 1], s, p["q"], p["W"], p["H"], p["b"], coefficients,
+                                          p["base"], N=p["N"], edge=p["edge"])[:3] for s in t])
+    columns, data = traces(points, y.transpose(1, 2, 0))
+    write("P5_strip_consolidation", p, ["t [s]"] + columns, np.c_[t, np.array(data).T],
+          derived(S) + ["q from t = 0 on, falls linearly to 0 over |x-b| < edge/2"])
+
+
+def d1(p):
+    S, H = soil(p), p["H"]
+    z, rows = np.linspace(0, H, 41), []
+    for omega in p["omega"]:
+        for k, form in enumerate(("up", "up0")):
+            u, pressure, _ = up_column.harmonic(z, omega, p["q"], H, n=p["n"], form=form, **sub(S, *UP))
+            rows += [[omega, k, a, abs(b), np.angle(b), abs(c), np.angle(c)] for a, b, c in zip(z, u, pressure)]
+    write("D1_harmonic", p, ["omega [rad/s]", "form (0=up 1=up0)", "z [m]", "|u| [m]", "arg u [rad]", "|p| [Pa]",
+                             "arg p [rad]"], rows, derived(S) + ["load q exp(i omega t)"])
+
+
 def column(name, p):
     """Saturated columns under a load at the drained top."""
     S, H = soil(p), p["H"]
@@ -180,12 +245,8 @@ def d6(p):
     t, y = strip_box.dynamic(points[:, 0], points[:, 1], p["t_end"], p["nfft"], pulse, p["W"], p["H"], p["b"],
                              dict(coefficients, form="up"), p["base"], N=p["N"], edge=p["edge"])
     k = np.arange(0, len(t), max(1, len(t) // 500))
-    columns, data = ["t [s]"], [t[k]]
-    for i, (x, z) in enumerate(points):
-        for j, (quantity, unit) in enumerate((("ux", "m"), ("uz", "m"), ("p", "Pa"))):
-            columns.append("%s(%g;%g) [%s]" % (quantity, x, z, unit))
-            data.append(y[j, i][k])
-    write("D6_strip_dynamic_up", p, columns, np.array(data).T,
+    columns, data = traces(points, y[:, :, k])
+    write("D6_strip_dynamic_up", p, ["t [s]"] + columns, np.c_[t[k], np.array(data).T],
           derived(S) + ["load q(x) exp(-(t-t0)^2/(2 sigma_t^2)), q falls linearly to 0 over |x-b| < edge/2; from rest at "
                         "t = 0"])
 
@@ -213,6 +274,7 @@ def n1(p):
 
 TABLES = {"S1_bar_mode": s1, "S2_bar_step": s2, "S3_gravity_step": s3, "S4_column_selfweight": s4,
           "S5_simple_shear": s5, "P1_terzaghi": p1, "P2_selfweight_consolidation": p2,
+          "P3_two_layer": p3, "P4_mandel": p4, "P5_strip_consolidation": p5, "D1_harmonic": d1,
           "D2_step": lambda p: column("D2_step", p), "D3_ramp": lambda p: column("D3_ramp", p), "D5_standing": d5,
           "D6_strip_dynamic": d6, "G1_geostatic": g1, "N1_timestep": n1}
 
