@@ -142,14 +142,17 @@ class WaterTable : public Condition<dim>
 public:
   WaterTable(Section section, const Place<dim> &place) : Condition<dim>(section, place), level("0", {}, {})
   {
-    section.add("Level", level, 1, "m", "Height of the water table (the last coordinate), above or below the surface.");
+    section.add("Level", level, 1, "m",
+                "Height of the water table (the last coordinate), above or below the surface.");
     section.add("Unit weight", unit_weight, positive("N/m^3"), "Of the water: rho_f g.");
-    section.add("Suction", suction,
-                "Pressures above the water table are negative as if the water stood there at rest; otherwise zero.");
+    section.add(
+        "Suction", suction,
+        "Pressures above the water table are negative as if the water stood there at rest; otherwise zero.");
     section.require("Level", "condition '" + section.name() + "'");
     section.require_start("Level", level);
     if (place.on_mesh() && !section.describing())
-      section.fail("Where", "a water table acts on the surface of a body: 'surface of BODY' or 'top of BODY'");
+      section.fail("Where",
+                   "a water table acts on the surface of a body: 'surface of BODY' or 'top of BODY'");
   }
   bool concerns_fluid() const override { return true; }
   typename Condition<dim>::Fluid fluid() const override { return Condition<dim>::Fluid::pressure; }
@@ -162,7 +165,8 @@ public:
   {
     double x[3];
     coordinates(point.position, x);
-    return this->place.contains(point) ? -std::max(0., fluid_value(x, t)) * point.area : dealii::Tensor<1, dim>();
+    return this->place.contains(point) ? -std::max(0., fluid_value(x, t)) * point.area
+                                       : dealii::Tensor<1, dim>();
   }
 
   void add_loads(const ActiveNodes<dim> &, const Surface<dim> &surface,
@@ -189,8 +193,9 @@ private:
   double unit_weight = 9810.;
   bool suction = true;
 };
-const ConditionMember<WaterTable> water_table(
-    "water table", "water at rest up to a level: its pressure on a body's surface, as a load and in the pores.");
+const ConditionMember<WaterTable>
+    water_table("water table",
+                "water at rest up to a level: its pressure on a body's surface, as a load and in the pores.");
 
 template <int dim>
 class Flux : public Condition<dim>

@@ -57,8 +57,7 @@ public:
 private:
   Function value;
 };
-const ConditionMember<BodyForce> body_force("body force",
-                                            "a given force per mass in a region.");
+const ConditionMember<BodyForce> body_force("body force", "a given force per mass in a region.");
 
 template <int dim>
 class FluidSource : public Condition<dim>

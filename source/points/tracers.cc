@@ -104,8 +104,8 @@ public:
     return pieces;
   }
 
-  /// If the shape fills the box and none of its neighbours in part only: Gauss points on its faces beyond which
-  /// there is nothing of the shape.
+  /// If the shape fills the box and none of its neighbours in part only: Gauss points on its faces beyond
+  /// which there is nothing of the shape.
   bool add_whole_faces(const Bounds<dim> &box, const unsigned int n,
                        std::vector<typename Tracers<dim>::Tracer> &list) const
   {
@@ -226,8 +226,8 @@ template <int dim>
 void Tracers<dim>::find_adjoining(const std::function<bool(const dealii::Point<dim> &)> &is_in_other_body)
 {
   for (Tracer &tracer : list)
-    tracer.adjoins = is_in_other_body(tracer.initial_position + 1e-4 * grid.smallest_cell_size() /
-                                                                    tracer.area.norm() * tracer.area);
+    tracer.adjoins = is_in_other_body(tracer.initial_position +
+                                      1e-4 * grid.smallest_cell_size() / tracer.area.norm() * tracer.area);
 }
 
 template <int dim>

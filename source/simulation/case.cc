@@ -9,24 +9,27 @@ namespace peat {
 StageParameters::StageParameters(Section section) : name(section.name())
 {
   std::string solver_name = "dynamic";
-  section.add("Solver", solver_name, {"dynamic", "quasi-static", "static"},
-              "'dynamic': the full equations. 'quasi-static': without inertia, in steps as long as the pressures "
-              "change slowly. 'static': the state of equilibrium and of steady seepage under the loads at that "
-              "time.");
+  section.add(
+      "Solver", solver_name, {"dynamic", "quasi-static", "static"},
+      "'dynamic': the full equations. 'quasi-static': without inertia, in steps as long as the pressures "
+      "change slowly. 'static': the state of equilibrium and of steady seepage under the loads at that "
+      "time.");
   solver = solver_name == "static"         ? Solver::static_state
            : solver_name == "quasi-static" ? Solver::quasi_static
                                            : Solver::dynamic;
   if (solver != Solver::static_state || section.describing())
     section.add("Duration", duration, positive("s"), "How long the stage lasts; a static one takes no time.");
   std::string state_name = "points";
-  section.add("Static state", state_name, {"points", "fem"},
-              "Of a static stage with material points. 'points': on the points' own quadrature, so that an "
-              "explicit stage which follows stays at rest to round-off. 'fem': on the finite element mesh, from "
-              "which the points take their stresses and pressures.");
+  section.add(
+      "Static state", state_name, {"points", "fem"},
+      "Of a static stage with material points. 'points': on the points' own quadrature, so that an "
+      "explicit stage which follows stays at rest to round-off. 'fem': on the finite element mesh, from "
+      "which the points take their stresses and pressures.");
   static_on_points = state_name == "points";
-  section.add("K0", K0, nonnegative(""),
-              "Static: horizontal over vertical effective stress, where not given by elasticity (0). The vertical "
-              "direction is the last one; what is then out of balance is balanced elastically.");
+  section.add(
+      "K0", K0, nonnegative(""),
+      "Static: horizontal over vertical effective stress, where not given by elasticity (0). The vertical "
+      "direction is the last one; what is then out of balance is balanced elastically.");
   if (K0 > 0. && solver != Solver::static_state)
     section.fail("K0", "belongs to static stages");
   section.add("Reset displacements", reset_displacements,
@@ -124,9 +127,10 @@ Function read_gravity(Section root)
 Method read_method(Section root)
 {
   std::string name = "mpm";
-  root.add("Method", name, {"mpm", "fem"},
-           "'mpm': the coupled material point method. 'fem': u-p finite elements on the cells that the bodies "
-           "fill.");
+  root.add(
+      "Method", name, {"mpm", "fem"},
+      "'mpm': the coupled material point method. 'fem': u-p finite elements on the cells that the bodies "
+      "fill.");
   return name == "fem" ? Method::fem : Method::mpm;
 }
 
@@ -228,16 +232,17 @@ void Case<dim>::check(const Section &root) const
   for (const auto &stage : stages)
     for (const auto &body : bodies)
       if (stage.K0 > 0. && !keeps_stress(material(body.material).law()))
-        root.subsection("Stages").subsection(stage.name).fail(
-            "K0", "with the law of material '" + body.material +
-                      "' stress follows from strain alone; use 'linear elastic' or 'jaumann'");
+        root.subsection("Stages")
+            .subsection(stage.name)
+            .fail("K0", "with the law of material '" + body.material +
+                            "' stress follows from strain alone; use 'linear elastic' or 'jaumann'");
   for (const auto &condition : conditions)
     if (condition->has_fluid_source() && method == Method::mpm &&
-        std::any_of(stages.begin(), stages.end(), [](const auto &stage) {
-          return stage.solver == StageParameters::Solver::dynamic;
-        }))
-      condition->section.fail("Kind", "the explicit step of material points knows no fluid sources; use 'Method "
-                                      "= fem', or quasi-static stages");
+        std::any_of(stages.begin(), stages.end(),
+                    [](const auto &stage) { return stage.solver == StageParameters::Solver::dynamic; }))
+      condition->section.fail("Kind",
+                              "the explicit step of material points knows no fluid sources; use 'Method "
+                              "= fem', or quasi-static stages");
   for (const auto &condition : conditions)
     if (condition->concerns_fluid() && !is_saturated())
       condition->section.fail("Kind", "condition '" + condition->name +

@@ -36,6 +36,32 @@ double measure_step(ExplicitMPM<dim> &solver, const double dt, const double n_st
   return elapsed / n;
 }
 
+/// What `peat check` says of a case that finite elements solve.
+template <int dim>
+std::string describe_elements(const Case<dim> &parameters, const Grid<dim> &grid, Scene<dim> &scene)
+{
+  UpSolver<dim> solver(parameters.implicit, parameters.linear, UpSolver<dim>::Method::finite_elements,
+                       parameters.displacement_nodes(), parameters.scheme.seepage_inertia, grid, scene, 0.);
+  solver.prepare();
+  std::ostringstream text;
+  text << "u-p finite elements: " << solver.space().n_unknowns() << " unknowns";
+  for (const auto &stage : parameters.stages) {
+    using Mode = typename UpSolver<dim>::Mode;
+    text << "\nstage '" << stage.name << "': ";
+    if (stage.solver == StageParameters::Solver::static_state) {
+      text << "static";
+      continue;
+    }
+    const bool dynamic = stage.solver == StageParameters::Solver::dynamic;
+    solver.start(dynamic ? Mode::dynamic : Mode::quasi_static);
+    const StableStep step = solver.suggested_step();
+    text << "first step " << step.dt << " s (" << step.limit << ')';
+    if (dynamic)
+      text << ", about " << std::ceil(stage.duration / step.dt) << " steps, more if output asks for it";
+  }
+  return text.str();
+}
+
 template <int dim>
 int check(const ParameterFile &file, const RunOptions &options, MPI_Comm communicator)
 {
@@ -45,6 +71,10 @@ int check(const ParameterFile &file, const RunOptions &options, MPI_Comm communi
   Grid<dim> grid(parameters.grid, communicator);
   Scene<dim> scene = make_scene(parameters, grid);
   const Comparison<dim> comparison(parameters, std::filesystem::path(options.file).parent_path().string());
+  if (parameters.method == Method::fem) {
+    log.line(describe_elements(parameters, grid, scene));
+    return exit_success;
+  }
   ExplicitMPM<dim> solver(parameters.scheme, grid, scene, 0.);
   solver.prepare();
 

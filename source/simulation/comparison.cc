@@ -248,8 +248,8 @@ typename Comparison<dim>::Norms Comparison<dim>::compare_cells(const Reference &
 }
 
 template <int dim>
-typename Comparison<dim>::Norms Comparison<dim>::compare_points(const Reference &reference, const Curve *curve,
-                                                                const double time,
+typename Comparison<dim>::Norms Comparison<dim>::compare_points(const Reference &reference,
+                                                                const Curve *curve, const double time,
                                                                 const Scene<dim> &scene) const
 {
   Norms norms;

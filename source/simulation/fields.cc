@@ -121,8 +121,7 @@ void require_field(const Case<dim> &parameters, const std::string &body, const s
     if (!body.empty() && candidate.name != body)
       continue;
     const Material &material = parameters.material(candidate.material);
-    for (const std::string &name :
-         FieldAccess::names(Layout(dim, material, parameters.fields()), material))
+    for (const std::string &name : FieldAccess::names(Layout(dim, material, parameters.fields()), material))
       if (std::find(known.begin(), known.end(), name) == known.end())
         known.push_back(name);
   }

@@ -45,12 +45,13 @@ Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid)
   scene.gravity = parameters.gravity;
   for (const auto &body : parameters.bodies) {
     check_inside_mesh(body, parameters.grid);
-    scene.bodies.push_back(std::make_unique<Body<dim>>(body, parameters.material(body.material), grid,
-                                                       parameters.fields()));
+    scene.bodies.push_back(
+        std::make_unique<Body<dim>>(body, parameters.material(body.material), grid, parameters.fields()));
   }
   const auto add_surface = [&](const std::string &name) {
     if (scene.surfaces.find(name) == scene.surfaces.end())
-      cover(parameters, name, parameters.fields().gauss_points, scene.surfaces.emplace(name, grid).first->second);
+      cover(parameters, name, parameters.fields().gauss_points,
+            scene.surfaces.emplace(name, grid).first->second);
   };
   for (auto &condition : parameters.conditions)
     if (!condition->surface_of().empty())

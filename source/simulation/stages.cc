@@ -25,7 +25,8 @@ void Simulation<dim>::begin_stage(const StageParameters &stage, const StableStep
 {
   std::ostringstream message;
   message << "stage '" << stage.name << "': " << stage.duration << " s, "
-          << (unknowns_of_solver() == 0 ? "stable step " : "first step ") << step.dt << " s (" << step.limit << ')';
+          << (unknowns_of_solver() == 0 ? "stable step " : "first step ") << step.dt << " s (" << step.limit
+          << ')';
   if (unknowns_of_solver() > 0)
     message << ", " << unknowns_of_solver() << " unknowns";
   log.line(message.str());
@@ -46,9 +47,9 @@ void Simulation<dim>::make_up_solver(const typename UpSolver<dim>::Method method
   if (up_solver && method == UpSolver<dim>::Method::finite_elements)
     return;
   const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
-  auto made = std::make_unique<UpSolver<dim>>(
-      parameters.implicit, parameters.linear, method, parameters.displacement_nodes(),
-      parameters.scheme.seepage_inertia, grid, scene, start, carried);
+  auto made = std::make_unique<UpSolver<dim>>(parameters.implicit, parameters.linear, method,
+                                              parameters.displacement_nodes(),
+                                              parameters.scheme.seepage_inertia, grid, scene, start, carried);
   made->prepare();
   up_solver = made.get();
   solver = std::move(made);
@@ -91,8 +92,9 @@ void Simulation<dim>::run_static_stage(const StageParameters &stage, const doubl
     elements.gravity = scene.gravity;
     elements.conditions.swap(scene.conditions);
     {
-      UpSolver<dim> fem(parameters.implicit, parameters.linear, Method::finite_elements, parameters.implicit.element,
-                        parameters.scheme.seepage_inertia, grid, elements, start);
+      UpSolver<dim> fem(parameters.implicit, parameters.linear, Method::finite_elements,
+                        parameters.implicit.element, parameters.scheme.seepage_inertia, grid, elements,
+                        start);
       fem.prepare();
       fem.lead(scene);
       find_static_state(fem, stage.K0);
@@ -109,6 +111,7 @@ void Simulation<dim>::run_static_stage(const StageParameters &stage, const doubl
   report_work();
   steps.add(0.);
   wall.time_loop += seconds() - clock;
+  comparison.compare(now, scene, communicator);
   report(now, true);
 }
 
@@ -120,7 +123,8 @@ void Simulation<dim>::run_implicit_stage(const StageParameters &stage, const dou
   make_up_solver(parameters.method == peat::Method::fem ? UpSolver<dim>::Method::finite_elements
                                                         : UpSolver<dim>::Method::material_points,
                  start);
-  up_solver->start(stage.solver == StageParameters::Solver::quasi_static ? Mode::quasi_static : Mode::dynamic);
+  up_solver->start(stage.solver == StageParameters::Solver::quasi_static ? Mode::quasi_static
+                                                                         : Mode::dynamic);
   begin_stage(stage, up_solver->suggested_step());
   double clock = seconds();
   while (now < end && !stopped) {

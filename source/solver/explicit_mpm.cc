@@ -11,8 +11,8 @@ template <int dim>
 ExplicitMPM<dim>::ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &scene,
                               const double start_time, const Ledger<dim> &carried)
     : scheme(scheme), grid(grid), scene(scene), saturated(scene.is_saturated()),
-      has_loads(!scene.surfaces.empty() || scene.has_body_force()), active(grid, static_cast<unsigned int>(scheme.basis)),
-      now(start_time), book(carried)
+      has_loads(!scene.surfaces.empty() || scene.has_body_force()),
+      active(grid, static_cast<unsigned int>(scheme.basis)), now(start_time), book(carried)
 {
   for (const auto &body : scene.bodies) {
     const Material &material = body->material();

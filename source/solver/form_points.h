@@ -8,8 +8,8 @@
 
 #include <Eigen/Core>
 
-// What the weak form needs of the points of a cell: shape functions at eight of them, and the products of shape
-// functions of all of them that make the cell's matrix.
+// What the weak form needs of the points of a cell: shape functions at eight of them, and the products of
+// shape functions of all of them that make the cell's matrix.
 
 namespace peat {
 /// Up to eight points of a cell: their data and the shape functions at them. Lanes without a point have no
@@ -136,7 +136,8 @@ FormPoints<dim, reach>::FormPoints(const Grid<dim> &grid, const Body<dim> &body,
                           const int slope_direction) {
     Lanes result = broadcast(1.);
     for (int d = 0; d < dim; ++d, i /= per_direction)
-      result *= d == slope_direction ? weights[d].slope[i % per_direction] : weights[d].value[i % per_direction];
+      result *=
+          d == slope_direction ? weights[d].slope[i % per_direction] : weights[d].value[i % per_direction];
     return result;
   };
   for (unsigned int i = 0; i < n_nodes; ++i) {
@@ -210,7 +211,8 @@ public:
       drag.resize(n_points * dim, n_p);
     }
   }
-  void add(const Points &points, const std::array<Lanes, 36> &tangent, const Coefficients &c, bool has_pressure);
+  void add(const Points &points, const std::array<Lanes, 36> &tangent, const Coefficients &c,
+           bool has_pressure);
   /// The cell's matrix: minus the derivative of the residual.
   void multiply(const TimeLevel &level, bool has_pressure, dealii::FullMatrix<double> &result);
   /// sum V alpha^2 / K N_p N_p with the drained bulk modulus K.

@@ -28,7 +28,8 @@ Teuchos::ParameterList multigrid_settings()
 }
 
 /// a A + b B for matrices of different patterns but the same maps.
-void sum(TrilinosMatrix &result, const TrilinosMatrix &A, const double a, const TrilinosMatrix &B, const double b)
+void sum(TrilinosMatrix &result, const TrilinosMatrix &A, const double a, const TrilinosMatrix &B,
+         const double b)
 {
   Epetra_CrsMatrix *total = nullptr;
   EpetraExt::MatrixMatrix::Add(A.trilinos_matrix(), false, a, B.trilinos_matrix(), false, b, total);

@@ -50,7 +50,8 @@ private:
 };
 
 template <int dim, unsigned int reach>
-RestingSeepage<dim, reach>::RestingSeepage(Scene<dim> &scene, const ActiveNodes<dim> &active, const double time)
+RestingSeepage<dim, reach>::RestingSeepage(Scene<dim> &scene, const ActiveNodes<dim> &active,
+                                           const double time)
     : scene(scene), active(active), resistance(active.size(), 0.), inertia(active.size(), 0.)
 {
   nodal.time = time;
@@ -149,8 +150,8 @@ void RestingSeepage<dim, reach>::set(const Pressures &p)
 }
 
 template <int dim, unsigned int reach>
-typename RestingSeepage<dim, reach>::Pressures
-RestingSeepage<dim, reach>::divergence(const Pressures &p, const bool with_loads)
+typename RestingSeepage<dim, reach>::Pressures RestingSeepage<dim, reach>::divergence(const Pressures &p,
+                                                                                      const bool with_loads)
 {
   std::vector<double> &w = nodal.flux;
   std::fill(w.begin(), w.end(), 0.);
@@ -219,7 +220,8 @@ void balance(Scene<dim> &scene, const ActiveNodes<dim> &active, const double tim
   double rho_before = 0., reached = size(r), best = reached;
   const double scale = std::max(seepage.gross(), 1e-300);
   auto best_p = p;
-  for (unsigned int iteration = 0; iteration < 100 + 4. * n_cells && reached > tolerance * scale; ++iteration) {
+  for (unsigned int iteration = 0; iteration < 100 + 4. * n_cells && reached > tolerance * scale;
+       ++iteration) {
     for (std::size_t k = 0; k < r.size(); ++k)
       z[k] = r[k] / seepage.diagonal()[k];
     const double rho = seepage.dot(r, z);

@@ -86,7 +86,8 @@ void Space<dim>::distribute(const std::vector<CellId> &solid, const std::vector<
   relevant_sets.clear();
   const auto solid_cell = with_ghosts(solid);
   saturated_cell = with_ghosts(saturated);
-  number(displacement_handler, displacement_elements, kind == Nodes::gimp ? dilate(solid_cell) : solid_cell, 0);
+  number(displacement_handler, displacement_elements, kind == Nodes::gimp ? dilate(solid_cell) : solid_cell,
+         0);
   number(pressure_handler, pressure_elements, saturated_cell, 1);
   if (!has_pressure()) {
     owned_sets.pop_back();
@@ -151,7 +152,8 @@ void Space<dim>::make_displacement_tables(std::vector<CellId> solid, const std::
       for (unsigned int d = 0, rest = i; d < dim; ++d, rest /= k + 1) {
         // Exactly on the mesh's planes where the node is.
         const double fraction = double(rest % (k + 1)) / k;
-        const double lower = background.lower(id, d), upper = background.planes(d)[background.lattice(id)[d] + 1];
+        const double lower = background.lower(id, d),
+                     upper = background.planes(d)[background.lattice(id)[d] + 1];
         node.position[d] = fraction == 1. ? upper : lower + fraction * (upper - lower);
         node.displacement[d] = sorted[i * dim + d];
       }

@@ -1,7 +1,7 @@
 #include <peat/solver/up_boundary.h>
 
-#include <peat/material/mixture.h>
 #include <deal.II/base/mpi.h>
+#include <peat/material/mixture.h>
 
 #include "cell_shapes.h"
 
@@ -176,8 +176,8 @@ void UpBoundary<dim>::find_pressure(Piece &piece)
     return;
   const int axis = normal_axis(piece.point.area);
   if (axis >= 0) {
-    const double offset = (piece.point.position[axis] - grid.lower(piece.cell, axis)) /
-                          grid.size(piece.cell, axis);
+    const double offset =
+        (piece.point.position[axis] - grid.lower(piece.cell, axis)) / grid.size(piece.cell, axis);
     if (std::abs(offset - (piece.point.area[axis] > 0. ? 1. : 0.)) < on_plane) {
       prescribe_face(piece, axis);
       return;
@@ -235,11 +235,10 @@ void UpBoundary<dim>::share_pressures()
   std::stable_sort(pressures.begin(), pressures.end(), [](const GivenPressure &a, const GivenPressure &b) {
     return a.unknown < b.unknown || (a.unknown == b.unknown && a.condition && !b.condition);
   });
-  pressures.erase(std::unique(pressures.begin(), pressures.end(),
-                              [](const GivenPressure &a, const GivenPressure &b) {
-                                return a.unknown == b.unknown;
-                              }),
-                  pressures.end());
+  pressures.erase(
+      std::unique(pressures.begin(), pressures.end(),
+                  [](const GivenPressure &a, const GivenPressure &b) { return a.unknown == b.unknown; }),
+      pressures.end());
 }
 
 template <int dim>

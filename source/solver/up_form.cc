@@ -121,8 +121,7 @@ void PointForm<dim, reach>::evaluate(const Body<dim> &body, const Points &points
   const GradientLanes history = points.gradient(values.v_history);
   at.velocity_divergence += history[0] + history[4] + history[8];
   for (unsigned int d = 0; d < dim; ++d)
-    at.acceleration[d] =
-        level.acceleration * points.value(values.U, d) + points.value(values.a_history, d);
+    at.acceleration[d] = level.acceleration * points.value(values.U, d) + points.value(values.a_history, d);
 
   at.old_pressure = layout.pressure >= 0 ? points.load(layout.pressure) : Lanes{};
   at.pressure = broadcast(mean_pressure);
@@ -177,8 +176,8 @@ void PointForm<dim, reach>::add_residual(const Body<dim> &body, const Points &po
 
   const double scale = level.fluid_scale(), inertia = level.seepage_inertia ? 1. : 0.;
   const Lanes porosity = points.porosity(body.layout(), *mixture);
-  Lanes storage = mixture->storage(porosity) * at.pressure_rate +
-                  mixture->biot_coefficient() * at.velocity_divergence;
+  Lanes storage =
+      mixture->storage(porosity) * at.pressure_rate + mixture->biot_coefficient() * at.velocity_divergence;
   for (const Condition<dim> *condition : loads.fluids)
     for (unsigned int l = 0; l < points.n; ++l)
       storage[l] -= condition->fluid_source(points.position(body, l), level.time);
@@ -186,9 +185,9 @@ void PointForm<dim, reach>::add_residual(const Body<dim> &body, const Points &po
   Lanes slope = {};
   for (unsigned int d = 0; d < dim; ++d)
     slope += at.pressure_gradient[d] * at.pressure_gradient[d];
-  gross[1] += std::abs(scale) * sum(mobility * sqrt(slope) / space.grid().smallest_cell_size() +
-                                    V * level.pressure_rate * mixture->storage(porosity) *
-                                        sqrt(at.pressure * at.pressure));
+  gross[1] += std::abs(scale) *
+              sum(mobility * sqrt(slope) / space.grid().smallest_cell_size() +
+                  V * level.pressure_rate * mixture->storage(porosity) * sqrt(at.pressure * at.pressure));
   std::array<Lanes, dim> flux;
   for (unsigned int d = 0; d < dim; ++d)
     flux[d] = mobility * (mixture->fluid_density() * (loads.gravity[d] - inertia * at.acceleration[d]) -
@@ -404,8 +403,7 @@ void PointForm<dim, reach>::sum_mass(const Body<dim> &body, dealii::TrilinosWrap
 }
 
 template <int dim, unsigned int reach>
-void PointForm<dim, reach>::sum_inertia(const Body<dim> &body,
-                                        dealii::TrilinosWrappers::MPI::Vector &inertia)
+void PointForm<dim, reach>::sum_inertia(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &inertia)
 {
   sum_over_nodes(body, inertia,
                  [](const Points &points, const unsigned int i, unsigned int) { return points.N[i]; });

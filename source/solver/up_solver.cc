@@ -35,8 +35,8 @@ UpSolver<dim>::UpSolver(const ImplicitParameters &parameters, const LinearSolver
     : parameters(parameters), method(method), seepage_inertia(seepage_inertia), grid(grid), scene(scene),
       linear(is_linear(scene)), unknowns(grid, displacement),
       active(grid, displacement == Nodes::gimp ? 4 : 2), form(UpForm<dim>::make(unknowns)),
-      boundary(unknowns, scene, parameters.surface_penalty), linear_solver(linear_parameters, "an implicit step"), now(start_time),
-      book(carried)
+      boundary(unknowns, scene, parameters.surface_penalty),
+      linear_solver(linear_parameters, "an implicit step"), now(start_time), book(carried)
 {}
 
 template <int dim>
@@ -290,7 +290,9 @@ void UpSolver<dim>::solve(const TimeLevel &level, const double start, const doub
       residual_scale[b] = std::max(residual_scale[b], size);
     }
     fluid_scale_before = std::abs(level.fluid_scale());
-    if (!std::isfinite(right_side.l2_norm()) || iteration > parameters.newton_iterations) {
+    if ((iteration > 0 && converged(tolerance)) || right_side.l2_norm() == 0.)
+      return;
+    if (!std::isfinite(right_side.l2_norm()) || iteration >= parameters.newton_iterations) {
       std::ostringstream text;
       text << "the equations of the step from t = " << start << " s to " << end << " s have "
            << (std::isfinite(right_side.l2_norm()) ? "not been solved" : "no finite solution") << " after "
@@ -300,8 +302,6 @@ void UpSolver<dim>::solve(const TimeLevel &level, const double start, const doub
       text << "); use shorter steps, or more 'Newton iterations'";
       throw NumericalError(text.str());
     }
-    if ((iteration > 0 && converged(tolerance)) || right_side.l2_norm() == 0.)
-      return;
     correction = 0.;
     done.linear_iterations += linear_solver.solve(correction, right_side);
     boundary.constraints().set_zero(correction);
@@ -332,8 +332,8 @@ void UpSolver<dim>::line_search(const TimeLevel &level, const double before)
 template <int dim>
 void UpSolver<dim>::project_start()
 {
-  // Nodal pressures from the points': with no rates and no loads the storage term says (S p_n)_i = sum V p N /
-  // Q.
+  // Nodal pressures from the points': with no rates and no loads the storage term says (S p_n)_i = sum V p N
+  // / Q.
   second = 0.;
   if (!unknowns.has_pressure())
     return;
@@ -512,9 +512,8 @@ void UpSolver<dim>::reset_displacements()
 {
   std::vector<Scene<dim> *> scenes = followers;
   scenes.push_back(&scene);
-  for_each_point<dim>(scenes, [&](const Layout &layout, double *row) {
-    std::fill_n(row + layout.displacement, dim, 0.);
-  });
+  for_each_point<dim>(
+      scenes, [&](const Layout &layout, double *row) { std::fill_n(row + layout.displacement, dim, 0.); });
   for (auto &[name, tracers] : scene.surfaces)
     tracers.restart();
   if (scene.probes)

@@ -19,8 +19,9 @@ template <int dim>
 void UpSolver<dim>::solve_static()
 {
   if (unknowns.has_pressure() && !boundary.prescribes_pressure())
-    throw NumericalError("a static state needs a place where the pore pressure is given: a free surface, or a "
-                         "condition of kind 'pressure'");
+    throw NumericalError(
+        "a static state needs a place where the pore pressure is given: a free surface, or a "
+        "condition of kind 'pressure'");
   TimeLevel level = this->level(now, 0.);
   rate = 0.;
   state.rate_history = 0.;
@@ -100,7 +101,8 @@ StableStep UpSolver<dim>::suggested_step() const
     if (mixture && mode == Mode::dynamic)
       dt = parameters.step_factor * h / mixture->undrained_speed(M);
     if (mixture && mode == Mode::quasi_static) {
-      dt = 0.25 * h * h * (mixture->storage() + std::pow(mixture->biot_coefficient(), 2) / M) / mixture->mobility();
+      dt = 0.25 * h * h * (mixture->storage() + std::pow(mixture->biot_coefficient(), 2) / M) /
+           mixture->mobility();
       limit = "diffusion over half a cell in '" + body->name() + "'";
     }
     if ((mixture || mode == Mode::dynamic) && dt < best.dt)
@@ -213,8 +215,8 @@ double UpSolver<dim>::quasi_static_step(const double latest)
     // What loads do that jump is no error that shorter steps could reduce.
     const bool free = parameters.fixed_step > 0. || !first_step_done;
     if (free || error <= parameters.step_tolerance) {
-      const double growth = std::min(
-          parameters.largest_growth, 0.8 * std::sqrt(parameters.step_tolerance / std::max(error, 1e-300)));
+      const double growth = std::min(parameters.largest_growth,
+                                     0.8 * std::sqrt(parameters.step_tolerance / std::max(error, 1e-300)));
       const double before = std::max(dt, ends_there ? next_step : 0.);
       next_step = parameters.fixed_step > 0. ? parameters.fixed_step
                   : !first_step_done         ? dt
@@ -269,8 +271,9 @@ double UpSolver<dim>::diagonally_implicit_step(const double dt)
   moved += unknown;
   displacement_scale = std::max(displacement_scale, moved.block(0).linfty_norm());
   const auto relative = [&](const unsigned int block, const double scale) {
-    return scale > 0. ? difference.block(block).l2_norm() / std::sqrt(double(difference.block(block).size())) / scale
-                      : 0.;
+    return scale > 0.
+               ? difference.block(block).l2_norm() / std::sqrt(double(difference.block(block).size())) / scale
+               : 0.;
   };
   double error = relative(0, displacement_scale);
   if (unknowns.has_pressure()) {

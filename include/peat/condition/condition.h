@@ -80,7 +80,10 @@ public:
   /// Force [N] on a piece of a body's surface.
   virtual dealii::Tensor<1, dim> force(const SurfacePoint<dim> &, double /*t*/) const { return {}; }
   /// Force per mass [m/s^2] on the material at x.
-  virtual dealii::Tensor<1, dim> body_force(const dealii::Point<dim> & /*x*/, double /*t*/) const { return {}; }
+  virtual dealii::Tensor<1, dim> body_force(const dealii::Point<dim> & /*x*/, double /*t*/) const
+  {
+    return {};
+  }
   virtual bool has_body_force() const { return false; }
   /// Volume of fluid that is produced per volume and time [1/s] at x.
   virtual double fluid_source(const dealii::Point<dim> & /*x*/, double /*t*/) const { return 0.; }

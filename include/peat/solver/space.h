@@ -18,9 +18,9 @@ enum class Nodes : unsigned int {
   gimp = 4 ///< FE_Q(1) averaged over the points' domains, see Basis
 };
 
-/// The unknowns of the u-p equations on the cells that bodies fill: displacements (dim components a node) and,
-/// in cells of saturated material, pore pressures of FE_Q(1). Numbered by deal.II's DoFHandler; cells without
-/// material have FE_Nothing and no unknowns.
+/// The unknowns of the u-p equations on the cells that bodies fill: displacements (dim components a node)
+/// and, in cells of saturated material, pore pressures of FE_Q(1). Numbered by deal.II's DoFHandler; cells
+/// without material have FE_Nothing and no unknowns.
 ///
 /// Unknowns are numbered in two blocks: displacements first, pressures after them. Nodes of a cell run with x
 /// fastest, the components of a node are neighbours.
@@ -32,8 +32,8 @@ public:
 
   Space(const Grid<dim> &grid, Nodes displacement);
 
-  /// Number the unknowns. `solid` and `saturated` are cells of this rank that hold points of any body and of a
-  /// saturated one. Collective.
+  /// Number the unknowns. `solid` and `saturated` are cells of this rank that hold points of any body and of
+  /// a saturated one. Collective.
   void distribute(const std::vector<CellId> &solid, const std::vector<CellId> &saturated);
 
   Nodes nodes() const { return kind; }
@@ -83,7 +83,8 @@ public:
   };
   const std::vector<PressureNode> &pressure_nodes() const { return pressure_node_list; }
 
-  /// A displacement field (with ghosts) at a place in a cell that holds points, or on its edge; zero elsewhere.
+  /// A displacement field (with ghosts) at a place in a cell that holds points, or on its edge; zero
+  /// elsewhere.
   dealii::Tensor<1, dim> value(const dealii::TrilinosWrappers::MPI::Vector &displacement,
                                const dealii::Point<dim> &x) const;
   /// A cell that holds points and contains the place, or no_index.

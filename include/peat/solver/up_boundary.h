@@ -1,7 +1,7 @@
 #pragma once
 
-#include <peat/solver/scene.h>
 #include <peat/solver/implicit_parameters.h>
+#include <peat/solver/scene.h>
 #include <peat/solver/up_form.h>
 
 #include <deal.II/lac/affine_constraints.h>
@@ -9,12 +9,12 @@
 #include <vector>
 
 namespace peat {
-/// What the conditions of a scene mean for the unknowns of a Space: which are prescribed, and what acts on the
-/// bodies' surfaces and the mesh's faces.
+/// What the conditions of a scene mean for the unknowns of a Space: which are prescribed, and what acts on
+/// the bodies' surfaces and the mesh's faces.
 ///
-/// On faces of the mesh nothing passes unless a condition says so. On a saturated body's own surface, where no
-/// other saturated body lies behind it, the pressure is zero unless a condition says otherwise: prescribed at
-/// nodes where the surface runs along a face of cells, and by a penalty where it cuts cells.
+/// On faces of the mesh nothing passes unless a condition says so. On a saturated body's own surface, where
+/// no other saturated body lies behind it, the pressure is zero unless a condition says otherwise: prescribed
+/// at nodes where the surface runs along a face of cells, and by a penalty where it cuts cells.
 template <int dim>
 class UpBoundary
 {
@@ -30,7 +30,8 @@ public:
   const dealii::AffineConstraints<double> &unused() const { return unused_only; }
   bool prescribes_pressure() const { return any_pressure; }
 
-  /// Set the prescribed displacements since `start` and pressures at `end` in a vector of this rank's unknowns.
+  /// Set the prescribed displacements since `start` and pressures at `end` in a vector of this rank's
+  /// unknowns.
   void prescribe(double start, double end, BlockVector &unknown) const;
 
   /// The same of velocities: means over the time from `time` to `time + dt`.
@@ -42,10 +43,10 @@ public:
   /// What was prescribed holds against: sums over this rank's prescribed unknowns of the residual there.
   struct Reactions
   {
-    double work = 0.;               ///< on the motion U [J]
-    dealii::Tensor<1, dim> force;   ///< [N]
-    double gross_force = 0.;        ///< [N]
-    double outflow = 0.;            ///< [m^dim/s]
+    double work = 0.;             ///< on the motion U [J]
+    dealii::Tensor<1, dim> force; ///< [N]
+    double gross_force = 0.;      ///< [N]
+    double outflow = 0.;          ///< [m^dim/s]
   };
   Reactions reactions(const TimeLevel &level, const BlockVector &residual, const BlockVector &unknown) const;
   /// The same of the surface forces and fluxes of the last assemble().

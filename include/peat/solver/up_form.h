@@ -37,8 +37,8 @@ struct TimeLevel
 /// The nodal values that a step works with; vectors with ghosts. Blocks: displacement, pressure.
 struct StepState
 {
-  BlockVector unknown;      ///< U [m], P [Pa]
-  BlockVector rate_history; ///< v_history [m/s], rate_history [Pa/s]
+  BlockVector unknown;        ///< U [m], P [Pa]
+  BlockVector rate_history;   ///< v_history [m/s], rate_history [Pa/s]
   BlockVector second_history; ///< a_history [m/s^2]; the pressure block is p_n [Pa]
 };
 
@@ -79,20 +79,20 @@ public:
   static std::unique_ptr<UpForm> make(const Space<dim> &space);
 
   /// Add the body's part of the residual (right side minus left side, without regard to constraints), and, if
-  /// `matrix` is not null, of the matrix (minus the residual's derivative, constrained). `pressure_mass` gets the
-  /// sum of share V alpha^2 / K N_p N_p with the drained bulk modulus K of dim dimensions, if it is not null. Pressures act with
-  /// their means over cells where the space has no pressure for a saturated body.
+  /// `matrix` is not null, of the matrix (minus the residual's derivative, constrained). `pressure_mass` gets
+  /// the sum of share V alpha^2 / K N_p N_p with the drained bulk modulus K of dim dimensions, if it is not
+  /// null. Pressures act with their means over cells where the space has no pressure for a saturated body.
   virtual void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
                         const VolumeLoads<dim> &loads, double stabilisation,
                         const dealii::AffineConstraints<double> &constraints, BlockVector &residual,
                         BlockMatrix *matrix, dealii::TrilinosWrappers::SparseMatrix *pressure_mass,
                         GrossResidual &gross) = 0;
 
-  /// Take the step: stress, state, pressure, displacement and velocity of the points from the unknowns and the
-  /// velocity at its end (in `end_velocity`); with `move`, also positions, volumes and extents.
+  /// Take the step: stress, state, pressure, displacement and velocity of the points from the unknowns and
+  /// the velocity at its end (in `end_velocity`); with `move`, also positions, volumes and extents.
   virtual void update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
-                             const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity, bool move,
-                             StepWork &work) = 0;
+                             const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity,
+                             bool move, StepWork &work) = 0;
 
   /// Add sum m N_i v of the points.
   virtual void add_momentum(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &momentum) = 0;

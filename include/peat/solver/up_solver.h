@@ -1,12 +1,12 @@
 #pragma once
 
 #include <peat/solver/implicit_parameters.h>
+#include <peat/solver/linear_solver.h>
 #include <peat/solver/scene.h>
 #include <peat/solver/solver.h>
+#include <peat/solver/time_step.h>
 #include <peat/solver/up_boundary.h>
 #include <peat/solver/up_form.h>
-#include <peat/solver/linear_solver.h>
-#include <peat/solver/time_step.h>
 
 #include <memory>
 #include <string>
@@ -14,10 +14,11 @@
 
 namespace peat {
 /// The u-p equations solved implicitly, with the points of a scene's bodies as quadrature: with Gauss points
-/// the finite element method, with material points the implicit material point method, whose points then move.
+/// the finite element method, with material points the implicit material point method, whose points then
+/// move.
 ///
-/// A step is: level of time, Newton's iterations, new rates, points. Points carry stress, history and pressure;
-/// velocities, accelerations and the rates of pressures live on nodes.
+/// A step is: level of time, Newton's iterations, new rates, points. Points carry stress, history and
+/// pressure; velocities, accelerations and the rates of pressures live on nodes.
 template <int dim>
 class UpSolver : public Solver<dim>
 {
@@ -26,8 +27,8 @@ public:
   enum class Method {
     finite_elements, ///< Gauss points, which stay where they are
     material_points, ///< material points with the basis of the explicit method; quasi-static and static only
-    points_at_rest   ///< the same for the skeleton alone, under the pressures that the points have, which act as
-                     ///< in the explicit step: what is in equilibrium here is at rest there
+    points_at_rest   ///< the same for the skeleton alone, under the pressures that the points have, which act
+                   ///< as in the explicit step: what is in equilibrium here is at rest there
   };
 
   UpSolver(const ImplicitParameters &parameters, const LinearSolverParameters &linear, Method method,
@@ -44,8 +45,9 @@ public:
   void start(Mode mode);
   /// Step that the solver would take next, and why.
   StableStep suggested_step() const;
-  /// Advance by one step, not beyond `latest`; a quasi-static step may turn out shorter than suggested. Returns
-  /// its length. Throws NumericalError on every rank if it does not converge or a number is not finite.
+  /// Advance by one step, not beyond `latest`; a quasi-static step may turn out shorter than suggested.
+  /// Returns its length. Throws NumericalError on every rank if it does not converge or a number is not
+  /// finite.
   double step(double latest);
 
   /// The state of equilibrium and of steady seepage under the loads at the present time. Points take it, time
@@ -131,9 +133,9 @@ private:
   TimeLevel matrix_level;
 
   BlockVector unknown, correction, residual, right_side; ///< this rank's
-  BlockVector rate;         ///< v [m/s] and p_t [Pa/s] at the start of the step
-  BlockVector second;       ///< a [m/s^2] and p [Pa]
-  BlockVector total;        ///< displacement since the last reset [m]
+  BlockVector rate;                                      ///< v [m/s] and p_t [Pa/s] at the start of the step
+  BlockVector second;                                    ///< a [m/s^2] and p [Pa]
+  BlockVector total;                                     ///< displacement since the last reset [m]
   BlockVector ghosted_total, ghosted_rate;
   StepState state;
 
