@@ -72,9 +72,10 @@ void DirectFactor::copy_values(const BlockMatrix &matrix)
 
 void DirectFactor::complain() const
 {
-  throw NumericalError("the equations of " + purpose +
-                       " have no unique solution: hold every body by its boundary conditions (or let inertia hold it) "
-                       "and look for cells with next to no material");
+  throw NumericalError(
+      "the equations of " + purpose +
+      " have no unique solution: hold every body by its boundary conditions (or let inertia hold it) "
+      "and look for cells with next to no material");
 }
 
 void DirectFactor::build(const BlockMatrix &matrix, const PreconditionerData &)

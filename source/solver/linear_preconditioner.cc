@@ -21,14 +21,17 @@ Teuchos::ParameterList multigrid_settings()
   list.set("ML output", 0);
   list.set("aggregation: type", "Uncoupled");
   list.set("smoother: type", "Chebyshev");
-  list.set("smoother: sweeps", 3);
+  list.set("prec type",
+           "MGW"); // costs little more than a V and keeps iterations from growing with the levels
+  list.set("smoother: sweeps", 4);
   list.set("coarse: type", "Amesos-KLU");
-  list.set("coarse: max size", 1000);
+  list.set("coarse: max size", 2000);
   return list;
 }
 
 /// a A + b B for matrices of different patterns but the same maps.
-void sum(TrilinosMatrix &result, const TrilinosMatrix &A, const double a, const TrilinosMatrix &B, const double b)
+void sum(TrilinosMatrix &result, const TrilinosMatrix &A, const double a, const TrilinosMatrix &B,
+         const double b)
 {
   Epetra_CrsMatrix *total = nullptr;
   EpetraExt::MatrixMatrix::Add(A.trilinos_matrix(), false, a, B.trilinos_matrix(), false, b, total);

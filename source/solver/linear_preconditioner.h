@@ -59,16 +59,16 @@ private:
   dealii::TrilinosWrappers::PreconditionAMG amg;
 };
 
-/// Approximate inverse of a Schur complement  S = E + N (c_a M + c_k K)^-1 N^T  of pressures (E: compliance and
-/// conduction, N: divergence) by
+/// Approximate inverse of a Schur complement  S = E + N (c_a M + c_k K)^-1 N^T  of pressures (E: compliance
+/// and conduction, N: divergence) by
 ///
 ///     S^-1 = (E + F)^-1 + (E + N diag(c_a M)^-1 N^T)^-1.
 ///
-/// F is what N (c_k K)^-1 N^T is close to, the fixed-stress mass (White & Borja 2011; Kim, Tchelepi & Juanes 2011):
-/// right where inertia does not count. The second term is right where nothing but inertia counts (as Cahouet &
-/// Chabard 1988 do for Stokes flow). The harmonic sum of two operators lies between half the smaller and the
-/// smaller, and so does N (...)^-1 N^T between F and the inertial one: one factor for all steps and meshes.
-/// Without inertia the second term is absent.
+/// F is what N (c_k K)^-1 N^T is close to, the fixed-stress mass (White & Borja 2011; Kim, Tchelepi & Juanes
+/// 2011): right where inertia does not count. The second term is right where nothing but inertia counts (as
+/// Cahouet & Chabard 1988 do for Stokes flow). The harmonic sum of two operators lies between half the
+/// smaller and the smaller, and so does N (...)^-1 N^T between F and the inertial one: one factor for all
+/// steps and meshes. Without inertia the second term is absent.
 class SchurInverse
 {
 public:
@@ -91,14 +91,15 @@ private:
 ///     [ C    D   0 ]      G: int div(N_u) psi
 ///     [ G^T  0  -W ]      W: volumetric compliance
 ///
-/// from which the block matrix results when pi is eliminated. Multigrid on A itself needs iterations that grow
-/// with sqrt(lambda / mu), because its coarse spaces lock; A_s knows no lambda. (Lee, Mardal & Winther 2017 do the
-/// same with a total pressure.)
+/// from which the block matrix results when pi is eliminated. Multigrid on A itself needs iterations that
+/// grow with sqrt(lambda / mu), because its coarse spaces lock; A_s knows no lambda. (Lee, Mardal & Winther
+/// 2017 do the same with a total pressure.)
 class BlockOperator
 {
 public:
   using BlockVector = LinearSolver::BlockVector;
-  BlockOperator(const LinearSolver::BlockMatrix &matrix, const PreconditionerData &data) : matrix(matrix), data(data)
+  BlockOperator(const LinearSolver::BlockMatrix &matrix, const PreconditionerData &data)
+      : matrix(matrix), data(data)
   {}
   void vmult(BlockVector &result, const BlockVector &source) const;
 
@@ -107,8 +108,8 @@ private:
   const PreconditionerData data;
 };
 
-/// Approximate inverse of the Schur complement  W + (F^-1 + L^-1)^-1  of pi, where W and F (volumetric and shear
-/// compliance) are diagonal and L = G^T diag(c_a M)^-1 G. By the formula of Woodbury, used twice,
+/// Approximate inverse of the Schur complement  W + (F^-1 + L^-1)^-1  of pi, where W and F (volumetric and
+/// shear compliance) are diagonal and L = G^T diag(c_a M)^-1 G. By the formula of Woodbury, used twice,
 ///
 ///     S^-1 = 1 / (W + F) + s (L + s W)^-1 s,        s = F / (W + F).
 class VolumetricInverse
@@ -136,8 +137,9 @@ public:
 
 private:
   /// p and pi = t + P p by elimination of t, the total pressure, from
-  ///     [ -(W + S_t)   -W P            ] [t]   [f_pi          ]      P: projection,  (W + S_t)^-1: VolumetricInverse,
-  ///     [ -P^T W       -(E + P^T W P)  ] [p] = [f_p + P^T f_pi]      Schur complement for p: SchurInverse
+  ///     [ -(W + S_t)   -W P            ] [t]   [f_pi          ]      P: projection,  (W + S_t)^-1:
+  ///     VolumetricInverse, [ -P^T W       -(E + P^T W P)  ] [p] = [f_p + P^T f_pi]      Schur complement for
+  ///     p: SchurInverse
   /// in which u and p hardly meet: div u sees p - Pi p only.
   void solve_pressures(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const;
 
@@ -151,8 +153,8 @@ private:
   mutable TrilinosVector u_scratch, p_scratch, psi_scratch, projected;
 };
 
-/// The rigid-body modes of the unknowns, mode after mode: dim translations, then 1 or 3 rotations about the middle;
-/// 0 at fixed unknowns. [n_modes * n_owned]
+/// The rigid-body modes of the unknowns, mode after mode: dim translations, then 1 or 3 rotations about the
+/// middle; 0 at fixed unknowns. [n_modes * n_owned]
 std::vector<double> rigid_body_modes(const DisplacementUnknowns &unknowns);
 
 /// Diagonal of C diag(A)^-1 C^T.

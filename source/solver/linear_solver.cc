@@ -33,19 +33,23 @@ std::string short_number(const double value)
 LinearSolverParameters::LinearSolverParameters(Section section)
 {
   std::string name = "auto";
-  section.add("Method", name, {"auto", "direct", "iterative"},
-              "How linear systems are solved. 'direct': LU factors, no matter what the material; the cost grows fast with "
-              "the size in 3-D. 'iterative': FGMRES with a block preconditioner and algebraic multigrid; its cost "
-              "grows with the number of unknowns only. 'auto': direct up to the direct limit.");
+  section.add(
+      "Method", name, {"auto", "direct", "iterative"},
+      "How linear systems are solved. 'direct': LU factors, no matter what the material; the cost grows fast "
+      "with "
+      "the size in 3-D. 'iterative': FGMRES with a block preconditioner and algebraic multigrid; its cost "
+      "grows with the number of unknowns only. 'auto': direct up to the direct limit.");
   method = name == "auto" ? Method::automatic : name == "direct" ? Method::direct : Method::iterative;
-  section.add("Direct limit in 2-D", direct_limit_2d, any(""),
-              "Number of unknowns up to which 'auto' is direct in two dimensions. A larger one buys speed when many "
-              "steps share a matrix, and costs memory.");
+  section.add(
+      "Direct limit in 2-D", direct_limit_2d, any(""),
+      "Number of unknowns up to which 'auto' is direct in two dimensions. A larger one buys speed when many "
+      "steps share a matrix, and costs memory.");
   section.add("Direct limit in 3-D", direct_limit_3d, any(""),
               "Number of unknowns up to which 'auto' is direct in three dimensions.");
-  section.add("Tolerance", tolerance, strictly_between(0., 1.),
-              "Residual over right-hand side at which a solution is good enough. A looser one saves iterations, and "
-              "leaves what it leaves to the next Newton step.");
+  section.add(
+      "Tolerance", tolerance, strictly_between(0., 1.),
+      "Residual over right-hand side at which a solution is good enough. A looser one saves iterations, and "
+      "leaves what it leaves to the next Newton step.");
   section.add("Iterations", max_iterations, Range{"", 1.},
               "Largest number of iterations before the run ends with an error. 10 to 50 are usual.");
 }
@@ -71,7 +75,8 @@ bool LinearSolver::choose_direct() const
   return matrix->m() <= (unknowns.dim == 2 ? parameters.direct_limit_2d : parameters.direct_limit_3d);
 }
 
-void LinearSolver::prepare(const BlockMatrix &new_matrix, const PreconditionerData &new_data, const Reuse reuse)
+void LinearSolver::prepare(const BlockMatrix &new_matrix, const PreconditionerData &new_data,
+                           const Reuse reuse)
 {
   matrix = &new_matrix;
   data = new_data;
@@ -160,7 +165,8 @@ unsigned int LinearSolver::iterate(const double target, bool &converged)
   const ScaledInverse inverse{*preconditioner, inverse_scaling, scratch};
   dealii::SolverControl control(parameters.max_iterations, target);
   control.log_result(false);
-  dealii::SolverFGMRES<BlockVector> solver(control, dealii::SolverFGMRES<BlockVector>::AdditionalData(basis_size));
+  dealii::SolverFGMRES<BlockVector> solver(control,
+                                           dealii::SolverFGMRES<BlockVector>::AdditionalData(basis_size));
   try {
     solver.solve(rows, unknown, right_side, inverse);
     converged = true;
@@ -206,10 +212,11 @@ unsigned int LinearSolver::solve(BlockVector &solution, const BlockVector &rhs)
     n += iterate(target, converged);
   }
   if (!converged)
-    throw NumericalError("the linear equations of " + purpose + " are solved only to " + short_number(reached / size) +
-                         " after " + std::to_string(n) + " iterations, not to the Tolerance " +
-                         short_number(parameters.tolerance) +
-                         ": set Method = direct, or more Iterations, and look for cells with next to no material");
+    throw NumericalError(
+        "the linear equations of " + purpose + " are solved only to " + short_number(reached / size) +
+        " after " + std::to_string(n) + " iterations, not to the Tolerance " +
+        short_number(parameters.tolerance) +
+        ": set Method = direct, or more Iterations, and look for cells with next to no material");
   for (unsigned int b = 0; b < solution.n_blocks(); ++b)
     solution.block(b) = unknown.block(b);
   if (fresh_iterations == 0)

@@ -31,7 +31,8 @@ constexpr auto direct = LinearSolverParameters::Method::direct;
 constexpr auto iterative = LinearSolverParameters::Method::iterative;
 
 template <int dim>
-Vector solution_of(const PoroelasticCase &setting, const LinearSolverParameters &parameters, unsigned int &iterations)
+Vector solution_of(const PoroelasticCase &setting, const LinearSolverParameters &parameters,
+                   unsigned int &iterations)
 {
   const PoroelasticProblem<dim> problem(setting, MPI_COMM_WORLD);
   LinearSolver solver(parameters, "the test");
@@ -46,8 +47,10 @@ Vector solution_of(const PoroelasticCase &setting, const LinearSolverParameters 
 std::string name(const PoroelasticCase &c)
 {
   std::ostringstream text;
-  text << c.n_cells << " cells, Q" << c.degree << ", nu " << c.poisson << ", k " << c.conductivity << ", dt " << c.dt
-       << (c.dynamic ? " dynamic" : "") << (c.seepage_inertia ? " with G" : "") << (c.projected ? " projected" : "");
+  text << c.n_cells << " cells, Q" << c.degree << ", nu " << c.poisson << ", k " << c.conductivity << ", dt "
+       << c.dt << (c.dynamic ? " dynamic" : "") << (c.seepage_inertia ? " with G" : "")
+       << (c.projected ? " projected" : "") << (c.drained_top ? "" : " undrained")
+       << (c.sliver < 1. ? " sliver" : "");
   return text.str();
 }
 
@@ -63,9 +66,13 @@ void check(const PoroelasticCase &setting, const unsigned int bound)
   for (unsigned int b = 0; b < exact.n_blocks(); ++b) {
     Vector difference(found);
     difference -= exact;
-    BOOST_TEST(difference.block(b).l2_norm() <= 1e-8 * exact.block(b).l2_norm(),
-               name(setting) + ": block " + std::to_string(b) + " differs by " +
-                   std::to_string(difference.block(b).l2_norm() / exact.block(b).l2_norm()));
+    std::ostringstream text;
+    text << name(setting) << ": block " << b << " differs by "
+         << difference.block(b).l2_norm() / exact.block(b).l2_norm();
+    // A sliver's own rows count little in the residual.
+    BOOST_TEST(difference.block(b).l2_norm() <=
+                   (setting.sliver < 1. ? 1e-7 : 1e-8) * exact.block(b).l2_norm(),
+               text.str());
   }
 }
 } // namespace
@@ -99,13 +106,13 @@ BOOST_AUTO_TEST_CASE(nearly_incompressible)
     for (const double dt : {1e-5, 1e-4, 1e-3, 1e-1}) {
       setting.dt = dt;
       setting.dynamic = true;
-      check<2>(setting, 55);
+      check<2>(setting, 60);
       setting.dynamic = false;
-      check<2>(setting, 55);
+      check<2>(setting, 60);
     }
   }
   setting.saturated = false;
-  check<2>(setting, 55);
+  check<2>(setting, 60);
 }
 
 BOOST_AUTO_TEST_CASE(three_dimensions)
@@ -188,11 +195,12 @@ BOOST_AUTO_TEST_CASE(failure_in_the_users_words)
   LinearSolverParameters parameters = parameters_with(iterative);
   parameters.max_iterations = 3;
   unsigned int n;
-  BOOST_CHECK_EXCEPTION(solution_of<2>(PoroelasticCase(), parameters, n), NumericalError, [](const auto &error) {
-    const std::string text = error.what();
-    return text.find("the test") != std::string::npos && text.find("3 iterations") != std::string::npos &&
-           text.find("Method = direct") != std::string::npos && text.find('\n') == std::string::npos;
-  });
+  BOOST_CHECK_EXCEPTION(
+      solution_of<2>(PoroelasticCase(), parameters, n), NumericalError, [](const auto &error) {
+        const std::string text = error.what();
+        return text.find("the test") != std::string::npos && text.find("3 iterations") != std::string::npos &&
+               text.find("Method = direct") != std::string::npos && text.find('\n') == std::string::npos;
+      });
 }
 
 BOOST_AUTO_TEST_CASE(parameters)
@@ -200,7 +208,8 @@ BOOST_AUTO_TEST_CASE(parameters)
   const auto read = [](const std::string &lines) {
     return from_text(lines, [](const Section &section) { return LinearSolverParameters(section); });
   };
-  const LinearSolverParameters parameters = read("set Method = iterative\nset Tolerance = 1e-6\nset Iterations = 7");
+  const LinearSolverParameters parameters =
+      read("set Method = iterative\nset Tolerance = 1e-6\nset Iterations = 7");
   BOOST_TEST((parameters.method == iterative));
   BOOST_TEST(parameters.tolerance == 1e-6);
   BOOST_TEST(parameters.max_iterations == 7u);

@@ -19,8 +19,8 @@
 #include <cmath>
 #include <vector>
 
-/// One linear system of poroelasticity on the unit square or cube of sand, as a step of an implicit scheme has
-/// it: rollers at sides and bottom, a load of 1e5 Pa on a drained top. One cell matrix serves all cells.
+/// One linear system of poroelasticity on the unit square or cube of sand, as a step of an implicit scheme
+/// has it: rollers at sides and bottom, a load of 1e5 Pa on a drained top. One cell matrix serves all cells.
 struct PoroelasticCase
 {
   unsigned int n_cells = 8; ///< per direction
@@ -45,8 +45,8 @@ public:
   using Indices = std::vector<dealii::types::global_dof_index>;
 
   PoroelasticProblem(const PoroelasticCase &setting, MPI_Comm communicator)
-      : setting(setting), communicator(communicator), tria(communicator), u_element(dealii::FE_Q<dim>(setting.degree), dim),
-        p_element(1), u_dofs(tria), p_dofs(tria)
+      : setting(setting), communicator(communicator), tria(communicator),
+        u_element(dealii::FE_Q<dim>(setting.degree), dim), p_element(1), u_dofs(tria), p_dofs(tria)
   {
     dealii::GridGenerator::subdivided_hyper_cube(tria, setting.n_cells, 0., 1., true);
     u_dofs.distribute_dofs(u_element);
@@ -66,10 +66,12 @@ public:
 
   dealii::TrilinosWrappers::BlockSparseMatrix matrix;
   dealii::TrilinosWrappers::MPI::BlockVector rhs;
-  dealii::TrilinosWrappers::SparseMatrix pressure_mass; ///< int c_k^2 alpha^2/(c_k (lambda + 2 mu/dim)) N_p N_p
-  dealii::TrilinosWrappers::MPI::Vector inertia;        ///< diagonal of c_a M
+  dealii::TrilinosWrappers::SparseMatrix
+      pressure_mass;                             ///< int c_k^2 alpha^2/(c_k (lambda + 2 mu/dim)) N_p N_p
+  dealii::TrilinosWrappers::MPI::Vector inertia; ///< lumped c_a M, see peat::PreconditionerData
 
-  dealii::TrilinosWrappers::SparseMatrix shear, gradient, projection; ///< see peat::PreconditionerData; only if `projected`
+  dealii::TrilinosWrappers::SparseMatrix shear, gradient,
+      projection; ///< see peat::PreconditionerData; only if `projected`
   dealii::TrilinosWrappers::MPI::Vector volumetric_compliance, shear_compliance;
 
   peat::PreconditionerData data() const
@@ -106,7 +108,8 @@ public:
         for (unsigned int i = 0; i < indices.size(); ++i)
           if (owned.is_element(indices[i])) {
             const auto k = owned.index_within_set(indices[i]);
-            const dealii::Point<dim> x = mapping.transform_unit_to_real_cell(cell, u_element.unit_support_point(i));
+            const dealii::Point<dim> x =
+                mapping.transform_unit_to_real_cell(cell, u_element.unit_support_point(i));
             for (unsigned int d = 0; d < dim; ++d)
               result.positions[k][d] = x[d];
             result.components[k] = u_element.system_to_component_index(i).first;
@@ -123,7 +126,8 @@ private:
   {
     const dealii::QGauss<dim> quadrature(setting.degree + 1);
     dealii::FEValues<dim> u_values(mapping, u_element, quadrature,
-                                   dealii::update_values | dealii::update_gradients | dealii::update_JxW_values);
+                                   dealii::update_values | dealii::update_gradients |
+                                       dealii::update_JxW_values);
     dealii::FEValues<dim> p_values(mapping, p_element, quadrature,
                                    dealii::update_values | dealii::update_gradients);
     const double mu = setting.young / (2. * (1. + setting.poisson));
@@ -161,8 +165,10 @@ private:
         const double div_i = u_values[u].divergence(i, q);
         for (unsigned int j = 0; j < nu; ++j)
           A(i, j) += w * (2. * mu * (eps_i * u_values[u].symmetric_gradient(j, q)) +
-                          (setting.projected ? 0. : lambda * div_i * u_values[u].divergence(j, q)) + c_a * rho * (v_i * u_values[u].value(j, q)));
-        mass_diagonal[i] += w * c_a * rho * (v_i * v_i);
+                          (setting.projected ? 0. : lambda * div_i * u_values[u].divergence(j, q)) +
+                          c_a * rho * (v_i * u_values[u].value(j, q)));
+        // 1.25 per direction for Q2, 1.5 for Q1: then they add up to the mass.
+        mass_diagonal[i] += w * c_a * rho * (v_i * v_i) * std::pow(setting.degree == 2 ? 1.25 : 1.5, dim);
         for (unsigned int k = 0; k <= dim; ++k)
           G(i, k) += w * div_i * (k == 0 ? 1. : std::sqrt(12.) * (quadrature.point(q)[k - 1] - 0.5));
         for (unsigned int j = 0; j < np; ++j) {
@@ -175,7 +181,8 @@ private:
       for (unsigned int i = 0; i < np; ++i)
         for (unsigned int j = 0; j < np; ++j) {
           const double mass = w * p_values.shape_value(i, q) * p_values.shape_value(j, q);
-          D(i, j) -= p_scale * (c_v * mass / Q + w * kappa * (p_values.shape_grad(i, q) * p_values.shape_grad(j, q)));
+          D(i, j) -= p_scale *
+                     (c_v * mass / Q + w * kappa * (p_values.shape_grad(i, q) * p_values.shape_grad(j, q)));
           Mp(i, j) += mass / bulk;
         }
     }
@@ -270,7 +277,8 @@ private:
     dealii::IndexSet result(tria.n_global_active_cells() * (dim + 1));
     for (const auto &cell : tria.active_cell_iterators())
       if (cell->is_locally_owned())
-        result.add_range(cell->global_active_cell_index() * (dim + 1), (cell->global_active_cell_index() + 1) * (dim + 1));
+        result.add_range(cell->global_active_cell_index() * (dim + 1),
+                         (cell->global_active_cell_index() + 1) * (dim + 1));
     result.compress();
     return result;
   }
@@ -291,8 +299,8 @@ private:
   }
 
   static void add(dealii::TrilinosWrappers::SparseMatrix &target, const Matrix &local, const Indices &rows,
-                  const std::vector<bool> &fixed_rows, const Indices &columns, const std::vector<bool> &fixed_columns,
-                  const double factor, const bool diagonal)
+                  const std::vector<bool> &fixed_rows, const Indices &columns,
+                  const std::vector<bool> &fixed_columns, const double factor, const bool diagonal)
   {
     std::vector<double> values(columns.size());
     for (unsigned int i = 0; i < rows.size(); ++i) {

@@ -21,9 +21,10 @@ struct LinearSolverParameters
   enum class Method { automatic, direct, iterative };
 
   Method method = Method::automatic;
-  unsigned int direct_limit_2d = 60000; ///< largest number of unknowns for which `automatic` is direct, in 2-D
-  unsigned int direct_limit_3d = 4000;   ///< the same in 3-D
-  double tolerance = 1e-11;              ///< residual over right-hand side, in the norm of LinearSolver
+  unsigned int direct_limit_2d =
+      60000;                           ///< largest number of unknowns for which `automatic` is direct, in 2-D
+  unsigned int direct_limit_3d = 4000; ///< the same in 3-D
+  double tolerance = 1e-11;            ///< residual over right-hand side, in the norm of LinearSolver
   unsigned int max_iterations = 200;
 };
 
@@ -38,8 +39,8 @@ struct DisplacementUnknowns
   std::vector<bool> fixed;
 };
 
-/// What the preconditioner wants to know beside the matrix; assembled in the same loop. All pointers may be null
-/// and must live until the next prepare().
+/// What the preconditioner wants to know beside the matrix; assembled in the same loop. All pointers may be
+/// null and must live until the next prepare().
 ///
 /// With A = c_a M + c_k K, B = -c_k Q_c (see LinearSolver):
 struct PreconditionerData
@@ -47,34 +48,35 @@ struct PreconditionerData
   using Matrix = dealii::TrilinosWrappers::SparseMatrix;
   using Vector = dealii::TrilinosWrappers::MPI::Vector;
 
-  /// c_k int alpha^2 / (lambda + 2 mu / dim) N_p N_p, with constraints as in D. Needed by the iterative method
-  /// if there is a p block that couples.
+  /// c_k int alpha^2 / (lambda + 2 mu / dim) N_p N_p, with constraints as in D. Needed by the iterative
+  /// method if there is a p block that couples.
   const Matrix *pressure_mass = nullptr;
-  /// Diagonal of c_a M, i.e. c_a int rho N_u N_u; null if c_a = 0 (quasi-static). Entries of fixed unknowns
-  /// do not matter but must not be 0.
+  /// c_a M lumped in proportion to its diagonal (Hinton, Rock & Zienkiewicz 1976): c_a int rho N_u N_u
+  /// times 1.25^dim for Q2, 1.5^dim for Q1. The factor matters with G. Null if c_a = 0 (quasi-static).
+  /// Entries of fixed unknowns do not matter but must not be 0.
   const Vector *inertia = nullptr;
 
-  /// For nearly incompressible skeletons (nu > 0.45) only, all four or none; then the volumetric part of A must
-  /// be c_k int lambda Pi(div N_u) Pi(div N_u) with the cell-wise L2 projection Pi onto a space with an
+  /// For nearly incompressible skeletons (nu > 0.45) only, all four or none; then the volumetric part of A
+  /// must be c_k int lambda Pi(div N_u) Pi(div N_u) with the cell-wise L2 projection Pi onto a space with an
   /// orthogonal basis psi that is stable with the displacement: P1 for Q2, P0 for Q1.
-  const Matrix *shear = nullptr;      ///< A without its volumetric part, constraints as in A
+  const Matrix *shear = nullptr;    ///< A without its volumetric part, constraints as in A
   const Matrix *gradient = nullptr; ///< int div(N_u) psi [n_u][n_psi]; rows of fixed unknowns are 0
   const Vector *volumetric_compliance = nullptr; ///< int psi psi / (c_k lambda), diagonal [n_psi]
   const Vector *shear_compliance = nullptr;      ///< int psi psi / (2 c_k mu), diagonal [n_psi]
-  /// c_k int alpha psi N_p / int psi psi [n_psi][n_p], the projection on the cells; columns of constrained unknowns are
-  /// 0. Only with a p block.
+  /// c_k int alpha psi N_p / int psi psi [n_psi][n_p], the projection on the cells; columns of constrained
+  /// unknowns are 0. Only with a p block.
   const Matrix *projection = nullptr;
   unsigned int n_psi_per_cell = 1; ///< these stand together, the constant first
 };
 
 /// Solves the block systems of the u-p form,
 ///
-///     [ A  B ] [u]   [f_u]      A = c_a M + c_k K,                B = -c_k Q_c,  Q_c = int alpha div(N_u) N_p
-///     [ C  D ] [p] = [f_p]      C = B^T - (c_k c_g / c_v) G,      D = -(c_k / c_v) (c_p S + c_h H)
+///     [ A  B ] [u]   [f_u]      A = c_a M + c_k K,                B = -c_k Q_c,  Q_c = int alpha div(N_u)
+///     N_p [ C  D ] [p] = [f_p]      C = B^T - (c_k c_g / c_v) G,      D = -(c_k / c_v) (c_p S + c_h H)
 ///
-/// or the 1 x 1 system A u = f_u. The p rows must carry the factor -c_k / c_v, so that the system without G is
-/// symmetric (indefinite). Rows of constrained unknowns hold a diagonal entry of any sign and nothing else;
-/// their columns are empty.
+/// or the 1 x 1 system A u = f_u. The p rows must carry the factor -c_k / c_v, so that the system without G
+/// is symmetric (indefinite). Rows of constrained unknowns hold a diagonal entry of any sign and nothing
+/// else; their columns are empty.
 ///
 /// All methods are FGMRES; they differ in the preconditioner: a factorisation of the whole system (then it
 /// converges at once, and a factorisation of an earlier matrix still serves), or the block triangular one of
@@ -103,8 +105,8 @@ public:
   /// Call when the matrix changed. Matrix and data are kept by reference until the next call. Collective.
   void prepare(const BlockMatrix &matrix, const PreconditionerData &data, Reuse reuse = Reuse::pattern);
 
-  /// Solve from the initial guess in `solution`; returns the number of iterations. Throws a NumericalError on every
-  /// rank if the tolerance is not reached. Collective.
+  /// Solve from the initial guess in `solution`; returns the number of iterations. Throws a NumericalError on
+  /// every rank if the tolerance is not reached. Collective.
   unsigned int solve(BlockVector &solution, const BlockVector &rhs);
 
   bool is_direct() const { return direct; }
@@ -131,15 +133,15 @@ private:
   DisplacementUnknowns unknowns;
   const BlockMatrix *matrix = nullptr;
   PreconditionerData data;
-  BlockVector scaling;         ///< of the rows: 1 / sqrt(diagonal)
-  BlockVector inverse_scaling; ///< its inverse
+  BlockVector scaling;                      ///< of the rows: 1 / sqrt(diagonal)
+  BlockVector inverse_scaling;              ///< its inverse
   BlockVector unknown, right_side, scratch; ///< with the volumetric stress, if it is solved for
   double reached = 0.;                      ///< residual of the last solve
 
   std::unique_ptr<Preconditioner> preconditioner;
   bool direct = false;
-  bool is_fresh = false;            ///< the preconditioner was made from the present matrix
-  bool is_worn = false;             ///< it took many more iterations than at first
+  bool is_fresh = false;             ///< the preconditioner was made from the present matrix
+  bool is_worn = false;              ///< it took many more iterations than at first
   unsigned int fresh_iterations = 0; ///< of the first solve with this preconditioner; 0: none yet
   unsigned int n_builds = 0;
 };
