@@ -48,8 +48,10 @@ struct PreconditionerData
   using Matrix = dealii::TrilinosWrappers::SparseMatrix;
   using Vector = dealii::TrilinosWrappers::MPI::Vector;
 
-  /// c_k int alpha^2 / (lambda + 2 mu / dim) N_p N_p, with constraints as in D. Needed by the iterative
-  /// method if there is a p block that couples.
+  /// c_k int alpha^2 / (lambda + 2 mu / dim) N_p N_p, the fixed-stress mass, with constraints as in D. If the
+  /// volumetric part of A is projected (below), what the projection does not see meets no lambda:  c_k int
+  /// alpha^2 [Pi N_p Pi N_p / (lambda + 2 mu / dim) + (N_p - Pi N_p)(N_p - Pi N_p) / (2 mu)]. Needed by the
+  /// iterative method if there is a p block that couples.
   const Matrix *pressure_mass = nullptr;
   /// c_a M lumped in proportion to its diagonal (Hinton, Rock & Zienkiewicz 1976): c_a int rho N_u N_u
   /// times 1.25^dim for Q2, 1.5^dim for Q1. The factor matters with G. Null if c_a = 0 (quasi-static).
