@@ -21,9 +21,11 @@ Teuchos::ParameterList multigrid_settings()
   list.set("ML output", 0);
   list.set("aggregation: type", "Uncoupled");
   list.set("smoother: type", "Chebyshev");
-  list.set("smoother: sweeps", 3);
+  list.set("prec type",
+           "MGW"); // costs little more than a V and keeps iterations from growing with the levels
+  list.set("smoother: sweeps", 4);
   list.set("coarse: type", "Amesos-KLU");
-  list.set("coarse: max size", 1000);
+  list.set("coarse: max size", 2000);
   return list;
 }
 

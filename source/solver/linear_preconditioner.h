@@ -137,9 +137,9 @@ public:
 
 private:
   /// p and pi = t + P p by elimination of t, the total pressure, from
-  ///     [ -(W + S_t)   -W P            ] [t]   [f_pi          ]      P: projection,  (W + S_t)^-1:
-  ///     VolumetricInverse, [ -P^T W       -(E + P^T W P)  ] [p] = [f_p + P^T f_pi]      Schur complement for
-  ///     p: SchurInverse
+  ///     [ -(W + S_t)   -W P           ] [t]   [f_pi            ]
+  ///     [ -P^T W       -(E + P^T W P) ] [p] = [f_p + P^T f_pi  ]
+  /// with P: projection, (W + S_t)^-1: VolumetricInverse, Schur complement for p: SchurInverse,
   /// in which u and p hardly meet: div u sees p - Pi p only.
   void solve_pressures(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const;
 

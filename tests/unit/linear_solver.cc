@@ -49,7 +49,8 @@ std::string name(const PoroelasticCase &c)
   std::ostringstream text;
   text << c.n_cells << " cells, Q" << c.degree << ", nu " << c.poisson << ", k " << c.conductivity << ", dt "
        << c.dt << (c.dynamic ? " dynamic" : "") << (c.seepage_inertia ? " with G" : "")
-       << (c.projected ? " projected" : "");
+       << (c.projected ? " projected" : "") << (c.drained_top ? "" : " undrained")
+       << (c.sliver < 1. ? " sliver" : "");
   return text.str();
 }
 
@@ -65,9 +66,13 @@ void check(const PoroelasticCase &setting, const unsigned int bound)
   for (unsigned int b = 0; b < exact.n_blocks(); ++b) {
     Vector difference(found);
     difference -= exact;
-    BOOST_TEST(difference.block(b).l2_norm() <= 1e-8 * exact.block(b).l2_norm(),
-               name(setting) + ": block " + std::to_string(b) + " differs by " +
-                   std::to_string(difference.block(b).l2_norm() / exact.block(b).l2_norm()));
+    std::ostringstream text;
+    text << name(setting) << ": block " << b << " differs by "
+         << difference.block(b).l2_norm() / exact.block(b).l2_norm();
+    // A sliver's own rows count little in the residual.
+    BOOST_TEST(difference.block(b).l2_norm() <=
+                   (setting.sliver < 1. ? 1e-7 : 1e-8) * exact.block(b).l2_norm(),
+               text.str());
   }
 }
 } // namespace
@@ -101,13 +106,13 @@ BOOST_AUTO_TEST_CASE(nearly_incompressible)
     for (const double dt : {1e-5, 1e-4, 1e-3, 1e-1}) {
       setting.dt = dt;
       setting.dynamic = true;
-      check<2>(setting, 55);
+      check<2>(setting, 60);
       setting.dynamic = false;
-      check<2>(setting, 55);
+      check<2>(setting, 60);
     }
   }
   setting.saturated = false;
-  check<2>(setting, 55);
+  check<2>(setting, 60);
 }
 
 BOOST_AUTO_TEST_CASE(three_dimensions)

@@ -68,7 +68,7 @@ public:
   dealii::TrilinosWrappers::MPI::BlockVector rhs;
   dealii::TrilinosWrappers::SparseMatrix
       pressure_mass;                             ///< int c_k^2 alpha^2/(c_k (lambda + 2 mu/dim)) N_p N_p
-  dealii::TrilinosWrappers::MPI::Vector inertia; ///< diagonal of c_a M
+  dealii::TrilinosWrappers::MPI::Vector inertia; ///< lumped c_a M, see peat::PreconditionerData
 
   dealii::TrilinosWrappers::SparseMatrix shear, gradient,
       projection; ///< see peat::PreconditionerData; only if `projected`
@@ -167,7 +167,8 @@ private:
           A(i, j) += w * (2. * mu * (eps_i * u_values[u].symmetric_gradient(j, q)) +
                           (setting.projected ? 0. : lambda * div_i * u_values[u].divergence(j, q)) +
                           c_a * rho * (v_i * u_values[u].value(j, q)));
-        mass_diagonal[i] += w * c_a * rho * (v_i * v_i);
+        // 1.25 per direction for Q2, 1.5 for Q1: then they add up to the mass.
+        mass_diagonal[i] += w * c_a * rho * (v_i * v_i) * std::pow(setting.degree == 2 ? 1.25 : 1.5, dim);
         for (unsigned int k = 0; k <= dim; ++k)
           G(i, k) += w * div_i * (k == 0 ? 1. : std::sqrt(12.) * (quadrature.point(q)[k - 1] - 0.5));
         for (unsigned int j = 0; j < np; ++j) {

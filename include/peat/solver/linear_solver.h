@@ -21,10 +21,10 @@ struct LinearSolverParameters
   enum class Method { automatic, direct, iterative };
 
   Method method = Method::automatic;
-  unsigned int direct_limit_2d =
-      60000;                           ///< largest number of unknowns for which `automatic` is direct, in 2-D
-  unsigned int direct_limit_3d = 4000; ///< the same in 3-D
-  double tolerance = 1e-11;            ///< residual over right-hand side, in the norm of LinearSolver
+  /// Largest number of unknowns for which `automatic` is direct.
+  unsigned int direct_limit_2d = 60000;
+  unsigned int direct_limit_3d = 4000;
+  double tolerance = 1e-11; ///< residual over right-hand side, in the norm of LinearSolver
   unsigned int max_iterations = 200;
 };
 
@@ -40,7 +40,7 @@ struct DisplacementUnknowns
 };
 
 /// What the preconditioner wants to know beside the matrix; assembled in the same loop. All pointers may be
-/// null and must live until the next prepare().
+/// null; for how long they must live, see prepare().
 ///
 /// With A = c_a M + c_k K, B = -c_k Q_c (see LinearSolver):
 struct PreconditionerData
@@ -48,14 +48,17 @@ struct PreconditionerData
   using Matrix = dealii::TrilinosWrappers::SparseMatrix;
   using Vector = dealii::TrilinosWrappers::MPI::Vector;
 
-  /// c_k int alpha^2 / (lambda + 2 mu / dim) N_p N_p, with constraints as in D. Needed by the iterative
-  /// method if there is a p block that couples.
+  /// c_k int alpha^2 / (lambda + 2 mu / dim) N_p N_p, the fixed-stress mass, with constraints as in D. If the
+  /// volumetric part of A is projected (below), what the projection does not see meets no lambda:  c_k int
+  /// alpha^2 [Pi N_p Pi N_p / (lambda + 2 mu / dim) + (N_p - Pi N_p)(N_p - Pi N_p) / (2 mu)]. Needed by the
+  /// iterative method if there is a p block that couples.
   const Matrix *pressure_mass = nullptr;
-  /// Diagonal of c_a M, i.e. c_a int rho N_u N_u; null if c_a = 0 (quasi-static). Entries of fixed unknowns
-  /// do not matter but must not be 0.
+  /// c_a M lumped in proportion to its diagonal (Hinton, Rock & Zienkiewicz 1976): c_a int rho N_u N_u
+  /// times 1.25^dim for Q2, 1.5^dim for Q1. The factor matters with G. Null if c_a = 0 (quasi-static).
+  /// Entries of fixed unknowns do not matter but must not be 0.
   const Vector *inertia = nullptr;
 
-  /// For nearly incompressible skeletons (nu > 0.45) only, all four or none; then the volumetric part of A
+  /// For nearly incompressible skeletons (nu > 0.45) only, all or none; then the volumetric part of A
   /// must be c_k int lambda Pi(div N_u) Pi(div N_u) with the cell-wise L2 projection Pi onto a space with an
   /// orthogonal basis psi that is stable with the displacement: P1 for Q2, P0 for Q1.
   const Matrix *shear = nullptr;    ///< A without its volumetric part, constraints as in A
@@ -70,8 +73,10 @@ struct PreconditionerData
 
 /// Solves the block systems of the u-p form,
 ///
-///     [ A  B ] [u]   [f_u]      A = c_a M + c_k K,                B = -c_k Q_c,  Q_c = int alpha div(N_u)
-///     N_p [ C  D ] [p] = [f_p]      C = B^T - (c_k c_g / c_v) G,      D = -(c_k / c_v) (c_p S + c_h H)
+///     [ A  B ] [u]   [f_u]      A = c_a M + c_k K
+///     [ C  D ] [p] = [f_p]      B = -c_k Q_c,  Q_c = int alpha div(N_u) N_p
+///                               C = B^T - (c_k c_g / c_v) G
+///                               D = -(c_k / c_v) (c_p S + c_h H)
 ///
 /// or the 1 x 1 system A u = f_u. The p rows must carry the factor -c_k / c_v, so that the system without G
 /// is symmetric (indefinite). Rows of constrained unknowns hold a diagonal entry of any sign and nothing
@@ -101,7 +106,8 @@ public:
   /// Set-up from the unknowns, once per numbering. The next prepare() makes everything new.
   void reinit(DisplacementUnknowns unknowns);
 
-  /// Call when the matrix changed. Matrix and data are kept by reference until the next call. Collective.
+  /// Call when the matrix changed. Matrix and data are kept by reference, those of a kept preconditioner too:
+  /// assemble in place, or let them live until one is made from others. Collective.
   void prepare(const BlockMatrix &matrix, const PreconditionerData &data, Reuse reuse = Reuse::pattern);
 
   /// Solve from the initial guess in `solution`; returns the number of iterations. Throws a NumericalError on
