@@ -170,8 +170,10 @@ void UpSolver<dim>::prepare_linear_solver(const TimeLevel &level, const bool cou
     data.pressure_mass = &pressure_mass;
   }
   if (level.acceleration > 0.) {
+    // What the diagonal must be multiplied with to bound the mass matrix of these elements.
+    const double bound = std::pow(unknowns.nodes() == Nodes::q2 ? 1.25 : 1.5, dim);
     inertia = mass_diagonal;
-    inertia *= level.acceleration;
+    inertia *= bound * level.acceleration;
     data.inertia = &inertia;
   }
   linear_solver.prepare(matrix, data);

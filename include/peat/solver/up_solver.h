@@ -28,7 +28,7 @@ public:
     finite_elements, ///< Gauss points, which stay where they are
     material_points, ///< material points with the basis of the explicit method; quasi-static and static only
     points_at_rest   ///< the same for the skeleton alone, under the pressures that the points have, which act
-                   ///< as in the explicit step: what is in equilibrium here is at rest there
+                     ///< as in the explicit step: what is in equilibrium here is at rest there
   };
 
   UpSolver(const ImplicitParameters &parameters, const LinearSolverParameters &linear, Method method,
