@@ -195,6 +195,14 @@ def rest(c):
         for shift in (0, 0.37):
             check("slope, %s, shift %g" % (basis, shift), "G2_layered_slope",
                   {"Explicit MPM/Basis": basis, "Constants/shift": shift}, 1e-8)
+    for offset in (0, 0.37):
+        run = check("level in 3-D, offset %g" % offset, "G1_static_3d", {"Constants/offset": offset})
+        c.below("  pressure", run.error("pressure", "Linf"), 1e-8)
+        c.below("  stresses", max(run.error(s + " stress", "Linf") for s in ("vertical", "horizontal")), 1e-8)
+    # A given K0 on level ground is in equilibrium as it is.
+    run = check("K0 = 0.7", "G1_static", {"Stages/geostatic/K0": 0.7, "References/horizontal stress/Value":
+                                         "0.7*(-(rho - rho_f)*g*(H - y))"})
+    c.below("  stresses", max(run.error(s + " stress", "Linf") for s in ("vertical", "horizontal")), 1e-8)
     for z_w in (7, 13):
         run = check("water table at %g m" % z_w, "G1_static", {"Constants/z_w": z_w, "Constants/offset": 0.37})
         c.below("  pressure", run.error("pressure", "Linf"), 1e-8)
