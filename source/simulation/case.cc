@@ -46,6 +46,11 @@ StageParameters::StageParameters(Section section) : name(section.name())
     section.fail("Duration", "a static stage takes no time");
   if (solver == Solver::static_state)
     duration = 0.;
+  for (const char *key : {"Static state", "Reset displacements"})
+    if (solver != Solver::static_state && section.has(key))
+      section.fail(key, "belongs to static stages");
+  if (solver != Solver::dynamic && section.has("Local damping"))
+    section.fail("Local damping", "belongs to dynamic stages");
 }
 
 unsigned int read_dimension(const ParameterFile &file)
@@ -229,6 +234,11 @@ void Case<dim>::check(const Section &root) const
       root.subsection("Materials").subsection(body.material).fail("", message.str());
     }
   }
+  for (const auto &stage : stages)
+    if (method == Method::fem && stage.local_damping > 0.)
+      root.subsection("Stages")
+          .subsection(stage.name)
+          .fail("Local damping", "damps explicit material points; finite elements do not have it");
   for (const auto &stage : stages)
     for (const auto &body : bodies)
       if (stage.K0 > 0. && !keeps_stress(material(body.material).law()))

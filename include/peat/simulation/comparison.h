@@ -13,7 +13,8 @@ namespace peat {
 ///
 /// Profiles and formulas: at each of their times the means over cells (CellMeans) of the reference's body, or
 /// of all that have the field, are compared at their centroids; a formula with `Single points` is compared
-/// with each point, and so is everything that finite elements give, at their Gauss points. With e = value - reference and the volumes V,
+/// with each point, and so is everything that finite elements give, at their Gauss points. With e = value -
+/// reference and the volumes V,
 ///   L1 = sum V |e| / sum V,   L2 = sqrt(sum V e^2 / sum V),   Linf = max |e|.
 /// Displacements are compared as functions of the place at the start, place - displacement.
 ///
