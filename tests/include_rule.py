@@ -19,8 +19,9 @@ BUILDS_ON = {
     "points": ["base", "material", "grid"],
     "transfer": ["base", "material", "grid", "points"],
     "condition": ["base", "grid"],
-    "solver": ["base", "material", "grid", "points", "transfer", "condition"],
-    "simulation": ["base", "material", "grid", "points", "transfer", "condition", "solver"],
+    "contact": ["base", "material", "grid", "points", "transfer"],
+    "solver": ["base", "material", "grid", "points", "transfer", "condition", "contact"],
+    "simulation": ["base", "material", "grid", "points", "transfer", "condition", "contact", "solver"],
     "": ["base", "simulation"],  # main.cc
 }
 MAY_INCLUDE_DEALII_IN_BASE = ("include/peat/base/compat.h", "include/peat/base/precompiled.h")

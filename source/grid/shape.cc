@@ -40,6 +40,54 @@ bool Bounds<dim>::overlaps(const Bounds &other, const double tolerance) const
   return true;
 }
 
+namespace {
+/// Central differences.
+template <int dim>
+dealii::Tensor<1, dim> gradient(const Shape<dim> &shape, const dealii::Point<dim> &x, const double h)
+{
+  dealii::Tensor<1, dim> result;
+  for (unsigned int d = 0; d < dim; ++d) {
+    dealii::Point<dim> below = x, above = x;
+    below[d] -= h;
+    above[d] += h;
+    result[d] = (shape.distance(above) - shape.distance(below)) / (2. * h);
+  }
+  return result;
+}
+} // namespace
+
+template <int dim>
+dealii::Tensor<1, dim> Shape<dim>::normal(const dealii::Point<dim> &x) const
+{
+  const double size = bounds().radius();
+  const double h = 1e-6 * (std::isfinite(size) ? size : 1. + x.norm());
+  const dealii::Tensor<1, dim> middle = gradient(*this, x, h);
+  const double d = distance(x), norm = middle.norm();
+  constexpr double smooth = 0.999, defined = 0.01;
+  if (norm > smooth || (std::abs(d) < 2. * h && norm > defined))
+    return middle / norm;
+
+  // Several points of the surface are as near. Beside x one of them is nearest: the one towards which the way
+  // ends on the surface.
+  dealii::Tensor<1, dim> best;
+  best[0] = 1.;
+  double best_miss = std::numeric_limits<double>::infinity();
+  for (unsigned int side = 0; side < 2 * dim; ++side) {
+    dealii::Point<dim> beside = x;
+    beside[side / 2] += side % 2 ? -4. * h : 4. * h;
+    const dealii::Tensor<1, dim> candidate = gradient(*this, beside, h);
+    if (candidate.norm() <= defined)
+      continue;
+    const double miss = std::abs(distance(x - d / candidate.norm() * candidate));
+    // Equal but for round-off and the step of the differences: the first one counts.
+    if (miss < best_miss - 100. * h) {
+      best = candidate / candidate.norm();
+      best_miss = miss;
+    }
+  }
+  return best;
+}
+
 template <int dim>
 void Shape<dim>::append_bounds_of_parts(std::vector<Bounds<dim>> &parts) const
 {

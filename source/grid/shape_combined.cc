@@ -177,6 +177,10 @@ public:
     return shape->distance(from + backward * (x - to));
   }
   bool is_distance() const override { return shape->is_distance(); }
+  dealii::Tensor<1, dim> normal(const dealii::Point<dim> &x) const override
+  {
+    return forward * shape->normal(from + backward * (x - to));
+  }
   bool is_convex() const override { return shape->is_convex(); }
   Bounds<dim> bounds() const override { return image(shape->bounds(), forward, from, to); }
 

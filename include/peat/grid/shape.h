@@ -4,6 +4,7 @@
 #include <peat/base/expression.h>
 
 #include <deal.II/base/point.h>
+#include <deal.II/base/tensor.h>
 
 #include <functional>
 #include <limits>
@@ -49,6 +50,11 @@ public:
   /// means something.
   virtual double distance(const dealii::Point<dim> &x) const = 0;
   virtual bool is_distance() const { return true; }
+
+  /// Unit vector out of the shape: from the nearest point of the surface if x is outside, towards it if x is
+  /// inside. Where several points are nearest it is that of one of them, and on an edge or corner of the
+  /// surface it lies between the adjacent faces' normals. By differences of distance(), to about 1e-9.
+  virtual dealii::Tensor<1, dim> normal(const dealii::Point<dim> &x) const;
 
   /// Whether it is certain that the segment between any two points inside is inside.
   virtual bool is_convex() const { return false; }
