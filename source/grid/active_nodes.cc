@@ -13,9 +13,10 @@ ActiveNodes<dim>::ActiveNodes(const Grid<dim> &grid, const unsigned int nodes_pe
 {}
 
 template <int dim>
-void ActiveNodes<dim>::rebuild(const std::vector<CellId> &occupied_cells)
+void ActiveNodes<dim>::rebuild(const std::vector<CellId> &occupied_cells,
+                               const std::vector<NodeId> &more_nodes)
 {
-  number_nodes(occupied_cells);
+  number_nodes(occupied_cells, more_nodes);
   make_exchange();
   for (auto &list : boundary_nodes)
     list.clear();
@@ -46,7 +47,8 @@ unsigned int ActiveNodes<dim>::add(const NodeId grid_node)
 }
 
 template <int dim>
-void ActiveNodes<dim>::number_nodes(const std::vector<CellId> &occupied_cells)
+void ActiveNodes<dim>::number_nodes(const std::vector<CellId> &occupied_cells,
+                                    const std::vector<NodeId> &more_nodes)
 {
   for (const CellId cell : cells)
     slot[cell] = no_index;
@@ -74,6 +76,8 @@ void ActiveNodes<dim>::number_nodes(const std::vector<CellId> &occupied_cells)
       table[s * n_cell_nodes + i] = add(background.node_at(lattice));
     }
   }
+  for (const NodeId n : more_nodes)
+    add(n);
 }
 
 template <int dim>
@@ -114,6 +118,19 @@ void ActiveNodes<dim>::make_exchange()
       share.nodes.push_back(add(relevant.index_within_set(index)));
     from_others.push_back(share);
   }
+}
+
+template <int dim>
+std::vector<NodeId> ActiveNodes<dim>::exchanged_nodes() const
+{
+  std::vector<NodeId> result;
+  for (const auto *shares : {&to_owners, &from_others})
+    for (const Share &share : *shares)
+      for (const std::uint32_t i : share.nodes)
+        result.push_back(node[i]);
+  std::sort(result.begin(), result.end());
+  result.erase(std::unique(result.begin(), result.end()), result.end());
+  return result;
 }
 
 template <int dim>

@@ -67,6 +67,30 @@ dealii::Tensor<1, dim> half_extents(const CutBox<dim> &part, const dealii::Tenso
   return half;
 }
 
+/// See Layout::surface_depth.
+template <int dim>
+double surface_depth(const Shape<dim> &shape, const dealii::Point<dim> &x,
+                     const dealii::Tensor<1, dim> &half_extent)
+{
+  // Deeper points are behind others that contact meets first.
+  constexpr double most_depth = 6.;
+  const double distance = -shape.distance(x);
+  auto n = shape.normal(x);
+  // Beside an edge two faces may be as near, and the normal between them meets neither.
+  const auto meets_surface = [&](const dealii::Tensor<1, dim> &direction) {
+    return std::abs(shape.distance(x + distance * direction)) < 1e-4 * distance;
+  };
+  for (unsigned int k = 0; k < 2 * dim && !meets_surface(n); ++k) {
+    n = dealii::Tensor<1, dim>();
+    n[k / 2] = k % 2 ? 1. : -1.;
+  }
+  double towards_surface = 0.;
+  for (unsigned int d = 0; d < dim; ++d)
+    towards_surface += std::abs(n[d]) * half_extent[d];
+  const double depth = distance / towards_surface;
+  return depth > 0. && depth < most_depth ? depth : 0.;
+}
+
 template <int dim>
 void fill_row(std::vector<double> &row, const Layout &layout, const Material &material,
               const BodyParameters<dim> &parameters, const CutBox<dim> &part,
@@ -100,6 +124,8 @@ void fill_row(std::vector<double> &row, const Layout &layout, const Material &ma
   if (layout.extent >= 0)
     for (unsigned int d = 0; d < dim; ++d)
       row[layout.extent + d] = half_extent[d];
+  if (layout.surface_depth >= 0)
+    row[layout.surface_depth] = surface_depth(*parameters.shape, part.centroid, half_extent);
   int column = layout.state;
   for (const StateField &field : material.law().state())
     for (const double value : field.initial)

@@ -23,8 +23,11 @@ Layout::Layout(const unsigned int dim, const Material &material, const SchemeFie
     n_state += field.initial.size();
   }
   Assert(n_state <= max_state_columns, dealii::ExcMessage("raise max_state_columns"));
-  if (scheme.extent)
+  if (scheme.extent || scheme.surface_depth)
     extent = add("half extent", "m", dim, Kind::vector);
+  wide_domains = scheme.extent;
+  if (scheme.surface_depth)
+    surface_depth = add("surface depth", "", 1, Kind::scalar);
 }
 
 int Layout::add(const std::string &name, const std::string &unit, const unsigned int n_components,

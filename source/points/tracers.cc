@@ -25,9 +25,9 @@ CellId Tracers<dim>::own_cell(const Tracer &tracer) const
 
 template <int dim>
 void Tracers<dim>::add(const std::uint32_t id, const dealii::Point<dim> &position,
-                       const dealii::Tensor<1, dim> &area)
+                       const dealii::Tensor<1, dim> &area, const int body)
 {
-  const Tracer tracer{id, position, position, area};
+  const Tracer tracer{id, position, position, area, false, body};
   const CellId cell = own_cell(tracer);
   if (cell != no_index && grid.is_owned(cell))
     list.push_back(tracer);
@@ -327,10 +327,10 @@ void Tracers<dim>::settle(const Body<dim> &body, const ActiveNodes<dim> &nodes)
         continue;
       const double *row = body.row(handle);
       volume += row[layout.volume];
-      if (layout.extent >= 0)
+      if (layout.wide_domains)
         edge = std::max(edge, side * body.position(handle)[axis] + row[layout.extent + axis]);
     }
-    if (layout.extent >= 0)
+    if (layout.wide_domains)
       tracer.position[axis] = side * edge;
     else {
       const double depth = std::min(grid.size(cell, axis), volume / area);
@@ -340,8 +340,12 @@ void Tracers<dim>::settle(const Body<dim> &body, const ActiveNodes<dim> &nodes)
 }
 
 template <int dim>
-void Tracers<dim>::locate(const ActiveNodes<dim> &nodes)
+void Tracers<dim>::locate(const ActiveNodes<dim> &nodes, const std::vector<std::size_t> &bodies)
 {
+  const auto is_meant = [&](const Tracer &tracer) {
+    return bodies.empty() ||
+           std::find(bodies.begin(), bodies.end(), std::size_t(std::max(0, tracer.body))) != bodies.end();
+  };
   carried.resize(list.size());
   carrier_cell.resize(list.size());
   for (std::size_t t = 0; t < list.size(); ++t) {
@@ -350,7 +354,7 @@ void Tracers<dim>::locate(const ActiveNodes<dim> &nodes)
     point.position = list[t].position;
     point.area = list[t].area;
     point.adjoins = list[t].adjoins;
-    const CellId cell = carrier_cell[t] = carrier(list[t], nodes);
+    const CellId cell = carrier_cell[t] = is_meant(list[t]) ? carrier(list[t], nodes) : no_index;
     if (cell == no_index) {
       point.node.fill(0);
       point.N.fill(0.);
@@ -423,7 +427,7 @@ bool Tracers<dim>::leaves_rank() const
 template <int dim>
 void Tracers<dim>::migrate()
 {
-  constexpr unsigned int n_values = 2 + 3 * dim;
+  constexpr unsigned int n_values = 3 + 3 * dim;
   std::map<unsigned int, std::vector<double>> outgoing;
   std::vector<Tracer> staying;
   for (const Tracer &tracer : list) {
@@ -442,6 +446,7 @@ void Tracers<dim>::migrate()
       values.push_back(tracer.area[d]);
     }
     values.push_back(tracer.adjoins);
+    values.push_back(tracer.body);
   }
   const auto incoming = dealii::Utilities::MPI::some_to_some(grid.communicator(), outgoing);
   for (const auto &[rank, values] : incoming)
@@ -454,6 +459,7 @@ void Tracers<dim>::migrate()
         tracer.area[d] = values[i + 3 + 3 * d];
       }
       tracer.adjoins = values[i + 1 + 3 * dim] != 0.;
+      tracer.body = values[i + 2 + 3 * dim];
       staying.push_back(tracer);
     }
   list.swap(staying);

@@ -108,6 +108,37 @@ std::vector<BodyParameters<dim>> read_bodies(const Section &section,
 }
 
 template <int dim>
+std::vector<RigidBodyParameters<dim>> read_rigid_bodies(const Section &section,
+                                                        const std::vector<std::string> &body_names)
+{
+  std::vector<RigidBodyParameters<dim>> bodies;
+  for (const std::string &name : section.user_sections("RIGID BODY")) {
+    if (std::find(body_names.begin(), body_names.end(), name) != body_names.end())
+      section.subsection(name).fail("", "there is a body " + in_quotes(name) + " in 'Bodies' already");
+    bodies.emplace_back(section.subsection(name));
+  }
+  return bodies;
+}
+
+template <int dim>
+std::vector<ContactParameters<dim>> read_contacts(const Section &section,
+                                                  const std::vector<std::string> &body_names,
+                                                  const std::vector<std::string> &rigid_names)
+{
+  std::vector<ContactParameters<dim>> contacts;
+  for (const std::string &name : section.user_sections("CONTACT")) {
+    const Section one = section.subsection(name);
+    contacts.emplace_back(one, body_names, rigid_names);
+    const auto &last = contacts.back();
+    for (std::size_t c = 0; c + 1 < contacts.size(); ++c)
+      if ((contacts[c].first == last.first && contacts[c].second == last.second) ||
+          (contacts[c].first == last.second && contacts[c].second == last.first))
+        one.fail("Bodies", "contact " + in_quotes(contacts[c].name) + " is of the same two bodies");
+  }
+  return contacts;
+}
+
+template <int dim>
 std::vector<std::unique_ptr<Condition<dim>>> read_conditions(const Section &section,
                                                              const std::vector<std::string> &bodies)
 {
@@ -189,6 +220,8 @@ Case<dim>::Case(const ParameterFile &file)
     : section(file.root()), title(read_title(file.root())), grid(file.root().subsection("Grid")),
       materials(read_materials(file.root().subsection("Materials"))),
       bodies(read_bodies<dim>(file.root().subsection("Bodies"), materials)),
+      rigid_bodies(read_rigid_bodies<dim>(file.root().subsection("Rigid bodies"), names(bodies))),
+      contacts(read_contacts<dim>(file.root().subsection("Contacts"), names(bodies), names(rigid_bodies))),
       conditions(read_conditions<dim>(file.root().subsection("Conditions"), names(bodies))),
       gravity(read_gravity<dim>(file.root())), method(read_method(file.root())),
       scheme(read_scheme(file.root())), implicit(file.root().subsection("Implicit solver")),
@@ -283,7 +316,11 @@ bool Case<dim>::is_implicit() const
 template <int dim>
 SchemeFields Case<dim>::fields() const
 {
-  return method == Method::fem ? gauss_fields() : scheme.fields();
+  if (method == Method::fem)
+    return gauss_fields();
+  SchemeFields fields = scheme.fields();
+  fields.surface_depth = !contacts.empty();
+  return fields;
 }
 
 template <int dim>

@@ -16,22 +16,6 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double touching = 1e-6;
 const std::vector<std::string> axis_names = {"x", "y", "z"};
 
-/// The body whose shape contains the place, or -1.
-template <int dim>
-int body_at(const Scene<dim> &scene, const dealii::Point<dim> &x, const double tolerance)
-{
-  int found = -1;
-  double nearest = tolerance;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const double distance = scene.bodies[b]->shape()->distance(x);
-    if (distance < nearest) {
-      nearest = distance;
-      found = b;
-    }
-  }
-  return found;
-}
-
 void sum_over_ranks(std::vector<double> &data, MPI_Comm communicator)
 {
   if (dealii::Utilities::MPI::n_mpi_processes(communicator) == 1)
@@ -48,7 +32,7 @@ ProbeWriter<dim>::ProbeWriter(const Case<dim> &parameters, const Scene<dim> &sce
 {
   for (const auto &probe : parameters.probes)
     probes.push_back({probe.name, probe.point, probe.follow,
-                      body_at(scene, probe.point, touching * grid.smallest_cell_size())});
+                      scene.body_at(probe.point, touching * grid.smallest_cell_size())});
   choose_fields(parameters);
   values.assign(probes.size() * (dim + fields.size()), nan);
   if (!probes.empty() && dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0) {

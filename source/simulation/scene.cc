@@ -67,9 +67,13 @@ Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid)
       const auto &probe = parameters.probes[i];
       if (!grid.contains(probe.point))
         probe.section.fail("Point", "probe '" + probe.name + "' lies outside the mesh");
-      scene.probes->add(i, probe.point, dealii::Tensor<1, dim>());
+      scene.probes->add(i, probe.point, dealii::Tensor<1, dim>(),
+                        scene.body_at(probe.point, 1e-6 * grid.smallest_cell_size()));
     }
   }
+  for (const auto &rigid : parameters.rigid_bodies)
+    scene.rigid_bodies.push_back(std::make_unique<RigidBody<dim>>(rigid));
+  scene.contacts = parameters.contacts;
   scene.conditions = std::move(parameters.conditions);
   check_scene(parameters, scene, grid);
   return scene;

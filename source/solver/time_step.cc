@@ -34,10 +34,10 @@ SliverFactors sliver_factors(const Body<dim> &body, const Slice &slice, const Gr
   for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
     const double *row = body.row(body.handles()[i]);
     volume += row[layout.volume];
-    for (unsigned int d = 0; d < dim && layout.extent >= 0; ++d)
+    for (unsigned int d = 0; d < dim && layout.wide_domains; ++d)
       domain = std::min(domain, 4. * row[layout.extent + d] / grid.size(slice.cell, d));
   }
-  if (layout.extent >= 0)
+  if (layout.wide_domains)
     return {1. / std::sqrt(1. + 1. / domain), 1. / (1. + 1. / domain), domain < 0.99};
   const double fill = volume / grid.volume(slice.cell);
   if (fill > 0.99)

@@ -55,6 +55,15 @@ Totals<dim> totals(const Scene<dim> &scene, MPI_Comm communicator)
   Totals<dim> sum;
   for (const auto &body : scene.bodies)
     add(*body, sum);
+  if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0)
+    for (const auto &rigid : scene.rigid_bodies)
+      if (!rigid->is_prescribed()) {
+        sum.mass += rigid->mass();
+        sum.kinetic_energy += rigid->kinetic_energy();
+        sum.momentum += rigid->momentum();
+        sum.center += rigid->mass() * rigid->center();
+        sum.largest_speed = std::max(sum.largest_speed, rigid->velocity().norm());
+      }
   std::vector<double> values = {sum.mass, sum.fluid_volume, sum.kinetic_energy, sum.elastic_energy,
                                 sum.fluid_energy};
   for (unsigned int d = 0; d < dim; ++d) {
@@ -80,7 +89,7 @@ void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MP
 {
   std::vector<double> values = {ledger.external_work, ledger.gravity_work,  ledger.seepage_dissipation,
                                 ledger.seepage_work,  ledger.fluid_outflow, ledger.fluid_squeezed,
-                                ledger.gross_impulse};
+                                ledger.gross_impulse, ledger.contact_dissipation};
   for (unsigned int d = 0; d < dim; ++d)
     values.push_back(ledger.impulse[d]);
   dealii::Utilities::MPI::sum(values, communicator, values);
@@ -91,8 +100,9 @@ void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MP
   book.fluid_outflow = values[4];
   book.fluid_squeezed = values[5];
   book.gross_impulse = values[6];
+  book.contact_dissipation = values[7];
   for (unsigned int d = 0; d < dim; ++d)
-    book.impulse[d] = values[7 + d];
+    book.impulse[d] = values[8 + d];
 
   mass_error = std::max(mass_error, std::abs(now.mass - start.mass) / start.mass);
   if (start.fluid_volume > 0.)
@@ -105,7 +115,8 @@ void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MP
     momentum_error =
         std::max(momentum_error, (now.momentum - start.momentum - book.impulse).norm() / momentum_scale);
 
-  numerical_dissipation = start.energy() + book.external_work + book.seepage_work - now.energy();
+  numerical_dissipation = start.energy() + book.external_work + book.seepage_work -
+                          book.contact_dissipation - now.energy();
   energy_scale = std::max(
       {energy_scale, now.energy(), start.energy(), std::abs(book.external_work), book.seepage_dissipation});
   if (energy_scale > 0.)

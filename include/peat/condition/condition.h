@@ -45,6 +45,9 @@ public:
   {}
   virtual ~Condition() = default;
 
+  /// One of the same kind with its own lists of nodes: bodies in contact have different nodes.
+  std::unique_ptr<Condition> copy() const { return copier(*this); }
+
   /// Whose surface it needs, or "".
   const std::string &surface_of() const { return place.body; }
 
@@ -97,6 +100,11 @@ public:
   const Place<dim> place;
   const std::string name;
 
+private:
+  template <template <int> class Member>
+  friend struct ConditionMember;
+  std::unique_ptr<Condition> (*copier)(const Condition &) = nullptr;
+
 protected:
   /// Active nodes on the mesh faces and in the region of `place`, per mesh face (region only: one list).
   struct Selection
@@ -128,14 +136,19 @@ struct ConditionMember
 {
   ConditionMember(const std::string &name, const std::string &text)
   {
-    condition_family<2>()[name] = {text,
-                                   [](const Section &s, const Place<2> &p) -> std::unique_ptr<Condition<2>> {
-                                     return std::make_unique<Member<2>>(s, p);
-                                   }};
-    condition_family<3>()[name] = {text,
-                                   [](const Section &s, const Place<3> &p) -> std::unique_ptr<Condition<3>> {
-                                     return std::make_unique<Member<3>>(s, p);
-                                   }};
+    condition_family<2>()[name] = {text, make<2>};
+    condition_family<3>()[name] = {text, make<3>};
+  }
+
+private:
+  template <int dim>
+  static std::unique_ptr<Condition<dim>> make(const Section &section, const Place<dim> &place)
+  {
+    std::unique_ptr<Condition<dim>> condition = std::make_unique<Member<dim>>(section, place);
+    condition->copier = [](const Condition<dim> &original) -> std::unique_ptr<Condition<dim>> {
+      return std::make_unique<Member<dim>>(static_cast<const Member<dim> &>(original));
+    };
+    return condition;
   }
 };
 } // namespace peat

@@ -18,6 +18,7 @@ struct NodalFields
   unsigned int n_sums = 0;           ///< columns of sums
   std::vector<double> sums;          ///< see Sums
   std::vector<double> force;         ///< external forces other than gravity [N], dim columns
+  std::vector<double> contact_force; ///< by other bodies [N], dim columns; only with contacts
   std::vector<double> velocity;      ///< at the start of the step [m/s], dim columns
   std::vector<double> acceleration;  ///< [m/s^2], dim columns
   std::vector<double> new_velocity;  ///< at the end of the step [m/s], dim columns

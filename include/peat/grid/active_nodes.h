@@ -18,8 +18,9 @@ public:
   ///        4 (those of its neighbours too)
   ActiveNodes(const Grid<dim> &grid, unsigned int nodes_per_direction);
 
-  /// Number the nodes that points in these owned cells reach. Collective: all ranks call it together.
-  void rebuild(const std::vector<CellId> &occupied_cells);
+  /// Number the nodes that points in these owned cells reach, and `more_nodes` of this rank's part of the
+  /// mesh. Collective: all ranks call it together.
+  void rebuild(const std::vector<CellId> &occupied_cells, const std::vector<NodeId> &more_nodes = {});
 
   unsigned int size() const { return node.size(); }
   unsigned int nodes_per_direction() const { return reach; }
@@ -40,6 +41,10 @@ public:
   const dealii::Point<dim> &position(const unsigned int i) const { return positions[i]; }
   const Grid<dim> &grid() const { return background; }
   NodeId grid_node(const unsigned int i) const { return node[i]; }
+  /// Number of a node of the mesh, or no_index if it is not active.
+  std::uint32_t index_of(const NodeId grid_node) const { return active_index[grid_node]; }
+  /// Nodes of the mesh that other ranks know, too.
+  std::vector<NodeId> exchanged_nodes() const;
   /// Position in cell_nodes() of the cell's own nodes, in deal.II's order of vertices.
   unsigned int own_node(unsigned int vertex) const;
 
@@ -63,7 +68,7 @@ public:
   unsigned int generation() const { return n_rebuilds; }
 
 private:
-  void number_nodes(const std::vector<CellId> &occupied_cells);
+  void number_nodes(const std::vector<CellId> &occupied_cells, const std::vector<NodeId> &more_nodes);
   void make_exchange();
   template <typename Combine>
   void combine_over_ranks(double *data, unsigned int n_components, const Combine &combine) const;

@@ -14,6 +14,7 @@ struct SchemeFields
 {
   bool extent = false;
   bool velocity_gradient = false;
+  bool surface_depth = false; ///< and `extent`; for contact
   /// Put Gauss points, so many per direction, into full cells instead of evenly spaced points; 0: no.
   unsigned int gauss_points = 0;
 };
@@ -50,7 +51,11 @@ struct Layout
   int stress = -1;            ///< effective Cauchy stress [Pa]
   int pressure = -1;          ///< pore pressure [Pa]; saturated bodies
   int porosity = -1;          ///< [-]; saturated bodies under finite strain (constant otherwise)
-  int extent = -1;            ///< half the edge lengths of the point's domain [m]; GIMP
+  int extent = -1;            ///< half the edge lengths of the point's domain [m]; GIMP and contact
+  bool wide_domains = false;  ///< domains reach nodes beyond the point's cell: GIMP
+  /// How deep below the body's surface the point was at the start, in units of its half extent towards the
+  /// surface; 0 for points far from it; contact.
+  int surface_depth = -1;
   int state = -1;             ///< what the law remembers
   unsigned int n_state = 0;   ///< number of columns of the law's memory
 

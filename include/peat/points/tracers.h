@@ -22,12 +22,14 @@ public:
     dealii::Point<dim> position;
     dealii::Tensor<1, dim> area; ///< outward normal times area; zero for a probe
     bool adjoins = false;        ///< see SurfacePoint
+    int body = -1;               ///< of a probe: the body it started in; -1: none
   };
 
   explicit Tracers(const Grid<dim> &grid) : grid(grid) {}
 
   /// Put a tracer here if this rank owns the cell it lies in. All ranks call it for all tracers.
-  void add(std::uint32_t id, const dealii::Point<dim> &position, const dealii::Tensor<1, dim> &area);
+  void add(std::uint32_t id, const dealii::Point<dim> &position, const dealii::Tensor<1, dim> &area,
+           int body = -1);
   /// Put tracers on the surface of a shape where this rank's cells are, with the given number of pieces per
   /// cell and direction. Faces that lie on the edge of the mesh are left out.
   /// With `gauss_points` > 0: so many Gauss points per direction on whole faces of cells.
@@ -44,7 +46,8 @@ public:
 
   /// Find for each tracer the nodes that carry it. A tracer whose own cell holds no material (the surface has
   /// risen a little above the grid line) is carried by the cell below it.
-  void locate(const ActiveNodes<dim> &nodes);
+  /// With a list, tracers of other bodies are not carried; those of no body go with body 0.
+  void locate(const ActiveNodes<dim> &nodes, const std::vector<std::size_t> &bodies = {});
   /// As located.
   const Surface<dim> &surface() const { return carried; }
   const std::vector<Tracer> &tracers() const { return list; }

@@ -5,7 +5,7 @@
 #include <deal.II/base/tensor.h>
 
 namespace peat {
-/// Sums over all points of all bodies and ranks.
+/// Sums over all points of all bodies and ranks, and over the free rigid bodies.
 template <int dim>
 struct Totals
 {

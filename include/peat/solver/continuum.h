@@ -1,0 +1,93 @@
+#pragma once
+
+#include <peat/condition/nodal_fields.h>
+#include <peat/solver/ledger.h>
+#include <peat/solver/scene.h>
+#include <peat/solver/scheme.h>
+#include <peat/transfer/kernels.h>
+
+namespace peat {
+/// Bodies that move with one velocity field of the grid: their nodes, the sums and velocities on them, and
+/// the stages of an explicit step (theory.md, a step). Bodies in contact belong to different continua.
+///
+/// Every stage that sums over ranks is collective; all continua of a scene take it one after the other.
+template <int dim>
+class Continuum
+{
+public:
+  /// @param bodies places in scene.bodies
+  Continuum(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &scene,
+            std::vector<std::size_t> bodies);
+
+  /// Number the nodes that carry these bodies, and `more_nodes` (of this rank's part of the mesh). Collective.
+  void number_nodes(const std::vector<NodeId> &more_nodes);
+  /// Cells of this rank that hold points of the bodies, ascending.
+  std::vector<CellId> occupied_cells() const;
+
+  // The stages of a step, in the order of the equations.
+  void points_to_nodes(double time, double dt);
+  void add_loads();
+  void find_velocities();
+  void solve_momentum();
+  void constrain_motion(Ledger<dim> &book);
+  void solve_darcy();
+  /// Velocities of the points; with modified-update-stress-last mapped back to the nodes: carrying_velocity().
+  void advance_points();
+  void deform_points();
+  void book_balances(Ledger<dim> &book) const;
+  void move_tracers();
+
+  const std::vector<std::size_t> &bodies() const { return members; }
+  const ActiveNodes<dim> &nodes() const { return active; }
+  NodalFields<dim> &fields() { return nodal; }
+  const NodalFields<dim> &fields() const { return nodal; }
+  bool is_saturated() const { return saturated; }
+  const dealii::Tensor<1, dim> &gravity() const { return gravity_now; }
+  const StepFindings &findings() const { return step_findings; }
+
+  double mass(const std::size_t node) const { return nodal.sums[node * nodal.n_sums + Sums<dim>::mass]; }
+  /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
+  std::vector<double> &carrying_velocity() { return remapped ? mapped_velocity : nodal.new_velocity; }
+  bool remaps_velocity() const { return remapped; }
+
+  /// For contact: one entry per node and component, whether a condition prescribes it.
+  void find_prescribed_rows();
+  bool is_prescribed(const std::size_t row) const { return prescribed[row]; }
+
+private:
+  void resize_fields();
+  void renumber_flux();
+  void find_small_nodes();
+  /// Half of the cells of the mesh on either side, in every direction [m^dim].
+  double node_volume(std::size_t node) const;
+  dealii::Tensor<1, dim> total_momentum() const;
+  PressureUpdate pressure_update(std::size_t member) const;
+  const Surface<dim> &surface(const Condition<dim> &condition) const;
+  Body<dim> &body(const std::size_t member) const { return *scene.bodies[members[member]]; }
+  bool holds_body(const std::string &name) const;
+
+  const SchemeParameters &scheme;
+  const Grid<dim> &grid;
+  Scene<dim> &scene;
+  const std::vector<std::size_t> members;
+  const bool remapped;
+  bool saturated = false;
+  bool has_loads = false;
+
+  ActiveNodes<dim> active;
+  std::vector<std::unique_ptr<Condition<dim>>> conditions; ///< those that concern these bodies
+  std::vector<std::string> surfaces;                       ///< bodies of which there are surface pieces
+  std::vector<std::unique_ptr<Kernels<dim>>> kernels;
+  std::vector<double> filter_rates; ///< of the pressure filter, by member [1/s]
+  NodalFields<dim> nodal;
+  std::vector<double> mapped_velocity;
+  /// Cells that have a node of little mass, by ActiveNodes::occupied_index().
+  std::vector<char> near_small_node;
+  unsigned int steps_to_small_nodes = 0;
+  /// Nodes and components on impermeable faces of the mesh.
+  std::vector<std::size_t> closed_rows;
+  std::vector<char> prescribed;
+  dealii::Tensor<1, dim> gravity_now;
+  StepFindings step_findings;
+};
+} // namespace peat

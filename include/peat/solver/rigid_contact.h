@@ -1,0 +1,58 @@
+#pragma once
+
+#include <peat/contact/rigid_body.h>
+#include <peat/solver/contact_pair.h>
+
+namespace peat {
+/// Contact of a rigid body and the bodies of a continuum: at the continuum's nodes near the rigid body's
+/// surface, with its distance and normal. A free rigid body and all its nodes find one common motion.
+template <int dim>
+class RigidContact : public ContactPair<dim>
+{
+public:
+  /// @param bodies places in scene.bodies of those of the continuum that take part
+  /// @param rigid_is_first whether the parameter file names the rigid body first
+  RigidContact(const ContactParameters<dim> &parameters, const SchemeParameters &scheme,
+               const Grid<dim> &grid, const Scene<dim> &scene, RigidBody<dim> &rigid,
+               Continuum<dim> &continuum, std::vector<std::size_t> bodies, bool rigid_is_first);
+
+  void match_nodes() override;
+  void begin(double time, double dt) override;
+  double solve() override;
+  void finish(Ledger<dim> &book) override;
+  void mark_nodes(const Continuum<dim> &continuum, std::vector<char> &count) const override;
+  void constrain_flux() override;
+  void constrain_carrying_velocity() override;
+
+private:
+  using Vector = typename ContactPair<dim>::Vector;
+  using Response = typename ContactPair<dim>::Response;
+  using Generalised = typename RigidBody<dim>::Generalised;
+  static constexpr unsigned int n_motions = RigidBody<dim>::n_motions;
+
+  void choose_nodes();
+  std::vector<dealii::Point<dim>> corners() const;
+  void find_gaps();
+  /// Impulses at all nodes if the rigid body moves like this; their wrench, and its derivatives with the
+  /// motion, over all ranks.
+  void respond_to(const Generalised &motion, std::vector<Response> &responses, std::vector<double> &wrench,
+                  std::vector<double> &slope) const;
+  Generalised find_motion(std::vector<Response> &responses) const;
+
+  const SchemeParameters &scheme;
+  const Grid<dim> &grid;
+  const Scene<dim> &scene;
+  RigidBody<dim> &rigid;
+  Continuum<dim> &continuum;
+  const std::vector<std::size_t> bodies;
+  const double sign; ///< -1: reports are of the body, not of the rigid one
+  const bool parallel;
+  double step_length = 0.;
+
+  std::vector<ContactSite<dim>> sites;
+  std::vector<std::uint32_t> site_of_node;
+  NearPoints<dim> near;
+  /// Where the corners of the rigid body's box were when the nodes were chosen.
+  std::vector<dealii::Point<dim>> corners_of_choice;
+};
+} // namespace peat

@@ -1,0 +1,86 @@
+#include <peat/contact/separating_plane.h>
+
+#include <Eigen/Dense>
+
+namespace peat {
+template <int dim>
+void SeparatingPlanes<dim>::reinit(const std::size_t n_sites)
+{
+  sums.assign(n_sites * n_sums, 0.);
+  planes.assign(n_sites * n_unknowns, 0.);
+}
+
+template <int dim>
+void SeparatingPlanes<dim>::add(const NearPoints<dim> &points, const double side,
+                                const std::vector<dealii::Point<dim>> &center, const double length)
+{
+  for (const auto &entry : points.entries()) {
+    const double *plane = &planes[std::size_t(entry.site) * n_unknowns];
+    double X[n_unknowns];
+    const auto &x = points.points()[entry.point].x;
+    double s = plane[dim];
+    X[dim] = 1.;
+    for (unsigned int d = 0; d < dim; ++d) {
+      X[d] = (x[d] - center[entry.site][d]) / length;
+      s += plane[d] * X[d];
+    }
+    // L = 2 / (1 + exp(-s)) - 1 is to be -1 in the first body and 1 in the second.
+    const double L = std::tanh(0.5 * s), slope = 0.5 * (1. - L * L);
+    double *sum = &sums[std::size_t(entry.site) * n_sums];
+    for (unsigned int i = 0; i < n_unknowns; ++i)
+      for (unsigned int j = i; j < n_unknowns; ++j)
+        *sum++ += slope * slope * X[i] * X[j];
+    for (unsigned int i = 0; i < n_unknowns; ++i)
+      *sum++ += slope * (side - L) * X[i];
+  }
+}
+
+template <int dim>
+bool SeparatingPlanes<dim>::improve()
+{
+  // Keeps the planes of separable points finite: the steeper the function, the fewer points decide.
+  constexpr double penalty = 1e-4;
+  constexpr double still = 1e-8;
+  using Matrix = Eigen::Matrix<double, n_unknowns, n_unknowns>;
+  using Vector = Eigen::Matrix<double, n_unknowns, 1>;
+  bool converged = true;
+  for (std::size_t site = 0; site < planes.size() / n_unknowns; ++site) {
+    const double *sum = &sums[site * n_sums];
+    Eigen::Map<Vector> plane(&planes[site * n_unknowns]);
+    Matrix A;
+    for (unsigned int i = 0; i < n_unknowns; ++i)
+      for (unsigned int j = i; j < n_unknowns; ++j)
+        A(i, j) = A(j, i) = *sum++;
+    Vector b(sum);
+    if (A(dim, dim) == 0.)
+      continue;
+    for (unsigned int d = 0; d < dim; ++d) {
+      A(d, d) += penalty;
+      b(d) -= penalty * plane(d);
+    }
+    A(dim, dim) += 1e-2 * penalty;
+    const Vector before = plane.template head<dim>().normalized().homogeneous();
+    Vector change = A.ldlt().solve(b);
+    // Newton's method for a function with a flat tail: no step that leaves the region where it is known.
+    const double limit = 1. + plane.norm();
+    if (change.norm() > limit)
+      change *= limit / change.norm();
+    plane += change;
+    converged = converged &&
+                (plane.template head<dim>().normalized() - before.template head<dim>()).norm() < still;
+  }
+  return converged;
+}
+
+template <int dim>
+dealii::Tensor<1, dim> SeparatingPlanes<dim>::normal(const std::size_t site) const
+{
+  dealii::Tensor<1, dim> n;
+  for (unsigned int d = 0; d < dim; ++d)
+    n[d] = planes[site * n_unknowns + d];
+  return n.norm() > 0. ? n / n.norm() : n;
+}
+
+template class SeparatingPlanes<2>;
+template class SeparatingPlanes<3>;
+} // namespace peat

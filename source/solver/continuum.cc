@@ -1,0 +1,389 @@
+#include <peat/solver/continuum.h>
+
+#include <peat/material/mixture.h>
+
+#include <algorithm>
+
+namespace peat {
+template <int dim>
+Continuum<dim>::Continuum(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &scene,
+                          std::vector<std::size_t> bodies)
+    : scheme(scheme), grid(grid), scene(scene), members(std::move(bodies)),
+      remapped(scheme.stress_update == SchemeParameters::StressUpdate::modified_last),
+      active(grid, static_cast<unsigned int>(scheme.basis))
+{
+  for (std::size_t b = 0; b < members.size(); ++b) {
+    const Material &material = body(b).material();
+    saturated = saturated || material.mixture();
+    kernels.push_back(Kernels<dim>::make(scheme.basis, material.mixture() != nullptr));
+    filter_rates.push_back(material.mixture()
+                               ? scheme.pressure_filter *
+                                     material.mixture()->undrained_speed(material.initial_modulus()) /
+                                     grid.smallest_cell_size()
+                               : 0.);
+  }
+  nodal.n_sums = Sums<dim>::n_columns(saturated);
+  for (const auto &[name, tracers] : scene.surfaces)
+    if (holds_body(name))
+      surfaces.push_back(name);
+  for (const auto &condition : conditions)
+    if (condition->surface_of().empty() || holds_body(condition->surface_of())) {
+      conditions.push_back(condition->copy());
+      has_loads = has_loads || condition->has_body_force();
+    }
+  has_loads = has_loads || !surfaces.empty();
+}
+
+template <int dim>
+bool Continuum<dim>::holds_body(const std::string &name) const
+{
+  return std::any_of(members.begin(), members.end(),
+                     [&](const std::size_t b) { return scene.bodies[b]->name() == name; });
+}
+
+template <int dim>
+std::vector<CellId> Continuum<dim>::occupied_cells() const
+{
+  std::vector<CellId> occupied;
+  for (std::size_t b = 0; b < members.size(); ++b)
+    for (const Slice &slice : body(b).slices())
+      occupied.push_back(slice.cell);
+  std::sort(occupied.begin(), occupied.end());
+  occupied.erase(std::unique(occupied.begin(), occupied.end()), occupied.end());
+  return occupied;
+}
+
+template <int dim>
+void Continuum<dim>::number_nodes(const std::vector<NodeId> &more_nodes)
+{
+  active.rebuild(occupied_cells(), more_nodes);
+  resize_fields();
+  steps_to_small_nodes = 0;
+
+  std::vector<bool> open(2 * dim, false);
+  for (const auto &condition : conditions) {
+    condition->select(active);
+    for (const unsigned int boundary : condition->opened_boundaries())
+      open[boundary] = true;
+  }
+  closed_rows.clear();
+  if (saturated)
+    for (unsigned int b = 0; b < 2 * dim; ++b)
+      if (!open[b])
+        for (const std::uint32_t i : active.on_boundary(b))
+          closed_rows.push_back(std::size_t(i) * dim + b / 2);
+}
+
+template <int dim>
+void Continuum<dim>::find_prescribed_rows()
+{
+  // What a condition overwrites is prescribed, whatever the value.
+  const double untouched = std::numeric_limits<double>::max();
+  std::vector<double> velocity(active.size() * dim, untouched);
+  for (const auto &condition : conditions)
+    condition->constrain_velocity(active, 0., 1., velocity);
+  prescribed.resize(velocity.size());
+  for (std::size_t row = 0; row < velocity.size(); ++row)
+    prescribed[row] = velocity[row] != untouched;
+}
+
+template <int dim>
+void Continuum<dim>::resize_fields()
+{
+  const std::size_t n = active.size();
+  nodal.sums.resize(n * nodal.n_sums);
+  for (auto *field : {&nodal.velocity, &nodal.acceleration, &nodal.new_velocity})
+    field->assign(n * dim, 0.);
+  if (remapped)
+    mapped_velocity.assign(n * dim, 0.);
+  if (has_loads)
+    nodal.force.assign(n * dim, 0.);
+  if (saturated) {
+    renumber_flux();
+    nodal.pressure_load.assign(n * dim, 0.);
+  }
+}
+
+template <int dim>
+void Continuum<dim>::renumber_flux()
+{
+  // Steps find the flux anew; this is for pictures between the steps. Another rank may know a node that is
+  // new here: its value comes with a count.
+  constexpr unsigned int n = dim + 1;
+  std::vector<double> known(active.size() * n, 0.);
+  for (std::size_t i = 0; i < active.size(); ++i)
+    if (const std::uint32_t old = active.previous_index(i); old != no_index && !nodal.flux.empty()) {
+      std::copy_n(&nodal.flux[std::size_t(old) * dim], dim, &known[i * n]);
+      known[i * n + dim] = 1.;
+    }
+  active.sum_over_ranks(known.data(), n);
+  nodal.flux.assign(active.size() * dim, 0.);
+  for (std::size_t i = 0; i < active.size(); ++i)
+    for (unsigned int d = 0; d < dim; ++d)
+      nodal.flux[i * dim + d] = known[i * n + d] / std::max(1., known[i * n + dim]);
+}
+
+template <int dim>
+double Continuum<dim>::node_volume(const std::size_t node) const
+{
+  const auto lattice = grid.node_lattice(active.grid_node(node));
+  double volume = 1.;
+  for (unsigned int d = 0; d < dim; ++d) {
+    const auto &planes = grid.planes(d);
+    const int i = lattice[d], last = planes.size() - 1;
+    volume *= 0.5 * (planes[std::min(i + 1, last)] - planes[std::max(i - 1, 0)]);
+  }
+  return volume;
+}
+
+template <int dim>
+void Continuum<dim>::find_small_nodes()
+{
+  if (steps_to_small_nodes-- > 0)
+    return;
+  steps_to_small_nodes = 100;
+  // Mass that a node would have if it were as densely filled as the fullest node of its cells.
+  std::vector<double> full_mass(active.size(), 0.);
+  for (const CellId cell : active.occupied_cells()) {
+    const std::uint32_t *cell_nodes = active.cell_nodes(cell);
+    // By mass per volume of the mesh around a node, so that nodes on the mesh's faces are as heavy as others.
+    double densest = 0.;
+    for (unsigned int v = 0; v < (1u << dim); ++v) {
+      const std::uint32_t i = cell_nodes[active.own_node(v)];
+      densest = std::max(densest, nodal.sums[std::size_t(i) * nodal.n_sums] / node_volume(i));
+    }
+    for (unsigned int i = 0; i < active.nodes_per_cell(); ++i)
+      full_mass[cell_nodes[i]] = std::max(full_mass[cell_nodes[i]], densest * node_volume(cell_nodes[i]));
+  }
+  active.max_over_ranks(full_mass.data(), 1);
+
+  // Of a body that fills its cells a node on a face has half of it, one on an edge or corner an eighth at
+  // least.
+  constexpr double small_share = 0.1;
+  std::vector<char> small(active.size(), 0);
+  for (std::size_t i = 0; i < active.size(); ++i)
+    small[i] = nodal.sums[i * nodal.n_sums + Sums<dim>::mass] < small_share * full_mass[i];
+  near_small_node.assign(active.occupied_cells().size(), 0);
+  for (std::size_t c = 0; c < near_small_node.size(); ++c) {
+    const std::uint32_t *cell_nodes = active.cell_nodes(active.occupied_cells()[c]);
+    for (unsigned int v = 0; v < (1u << dim); ++v)
+      near_small_node[c] |= small[cell_nodes[active.own_node(v)]];
+  }
+}
+
+template <int dim>
+void Continuum<dim>::points_to_nodes(const double time, const double dt)
+{
+  nodal.time = time;
+  nodal.dt = dt;
+  std::fill(nodal.sums.begin(), nodal.sums.end(), 0.);
+  for (std::size_t b = 0; b < members.size(); ++b)
+    kernels[b]->scatter(body(b), active, pressure_update(b), nodal.sums.data(), nodal.n_sums);
+  active.sum_over_ranks(nodal.sums.data(), nodal.n_sums);
+}
+
+template <int dim>
+PressureUpdate Continuum<dim>::pressure_update(const std::size_t member) const
+{
+  return {scheme.pressure_of_cells, 1. - std::exp(-filter_rates[member] * nodal.dt)};
+}
+
+template <int dim>
+const Surface<dim> &Continuum<dim>::surface(const Condition<dim> &condition) const
+{
+  static const Surface<dim> none;
+  return condition.surface_of().empty() ? none : scene.surfaces.at(condition.surface_of()).surface();
+}
+
+template <int dim>
+void Continuum<dim>::add_loads()
+{
+  for (const std::string &name : surfaces) {
+    Tracers<dim> &pieces = scene.surfaces.at(name);
+    pieces.settle(scene.body(name), active);
+    pieces.locate(active);
+  }
+  std::fill(nodal.force.begin(), nodal.force.end(), 0.);
+  std::fill(nodal.pressure_load.begin(), nodal.pressure_load.end(), 0.);
+  for (const auto &condition : conditions)
+    condition->add_loads(active, surface(*condition), nodal);
+  if (has_loads)
+    active.sum_over_ranks(nodal.force.data(), dim);
+  if (saturated)
+    active.sum_over_ranks(nodal.pressure_load.data(), dim);
+
+  const double origin[3] = {0., 0., 0.};
+  for (unsigned int d = 0; d < dim; ++d)
+    gravity_now[d] = scene.gravity.value(origin, nodal.time, d);
+}
+
+template <int dim>
+void Continuum<dim>::find_velocities()
+{
+  using S = Sums<dim>;
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    const double *sum = &nodal.sums[i * nodal.n_sums];
+    const double inverse = sum[S::mass] > 0. ? 1. / sum[S::mass] : 0.;
+    for (unsigned int d = 0; d < dim; ++d)
+      nodal.velocity[i * dim + d] = sum[S::momentum + d] * inverse;
+  }
+}
+
+template <int dim>
+void Continuum<dim>::solve_momentum()
+{
+  using S = Sums<dim>;
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    const double *sum = &nodal.sums[i * nodal.n_sums];
+    const double m = sum[S::mass];
+    const double inverse = m > 0. ? 1. / m : 0.;
+    for (unsigned int d = 0; d < dim; ++d) {
+      const std::size_t row = i * dim + d;
+      const double v = nodal.velocity[row];
+      double a =
+          (sum[S::force + d] + (has_loads ? nodal.force[row] : 0.)) * inverse + gravity_now[d] * (m > 0.);
+      if (scheme.local_damping > 0.)
+        a -= scheme.local_damping * std::copysign(a, v) * (v != 0.);
+      nodal.acceleration[row] = a;
+      nodal.new_velocity[row] = v + nodal.dt * a;
+    }
+  }
+}
+
+template <int dim>
+dealii::Tensor<1, dim> Continuum<dim>::total_momentum() const
+{
+  dealii::Tensor<1, dim> total;
+  for (std::size_t i = 0; i < active.size(); ++i)
+    if (active.is_owned(i))
+      for (unsigned int d = 0; d < dim; ++d)
+        total[d] += nodal.sums[i * nodal.n_sums + Sums<dim>::mass] * nodal.velocity[i * dim + d];
+  return total;
+}
+
+template <int dim>
+void Continuum<dim>::constrain_motion(Ledger<dim> &book)
+{
+  // Only where points take the grid's velocity does a node's prescribed velocity change their momentum at
+  // once.
+  const double share = 1. - scheme.retention(nodal.dt);
+  const auto before = share > 0. ? total_momentum() : dealii::Tensor<1, dim>();
+  for (const auto &condition : conditions)
+    condition->constrain_motion(active, nodal);
+  if (share > 0.)
+    book.impulse += share * (total_momentum() - before);
+}
+
+template <int dim>
+void Continuum<dim>::solve_darcy()
+{
+  if (!saturated)
+    return;
+  using S = Sums<dim>;
+  const double inertia = scheme.seepage_inertia ? 1. : 0.;
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    const double *sum = &nodal.sums[i * nodal.n_sums];
+    const double inverse = sum[S::resistance] > 0. ? 1. / sum[S::resistance] : 0.;
+    for (unsigned int d = 0; d < dim; ++d) {
+      const std::size_t row = i * dim + d;
+      nodal.flux[row] =
+          inverse * (sum[S::pressure_force + d] + nodal.pressure_load[row] +
+                     sum[S::fluid_inertia] * (gravity_now[d] - inertia * nodal.acceleration[row]));
+    }
+  }
+  for (const std::size_t row : closed_rows)
+    nodal.flux[row] = 0.;
+  for (const auto &condition : conditions)
+    condition->constrain_flux(active, surface(*condition), nodal);
+}
+
+template <int dim>
+void Continuum<dim>::advance_points()
+{
+  // A node with little mass has large accelerations. A point that it reaches feels them by the node's weight,
+  // but the gradient of its velocity would feel them in full, and bring them back to the node.
+  if (scheme.affine)
+    find_small_nodes();
+  if (!remapped)
+    return;
+  const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
+  const char *spin_only = scheme.affine ? near_small_node.data() : nullptr;
+  std::fill(mapped_velocity.begin(), mapped_velocity.end(), 0.);
+  for (std::size_t b = 0; b < members.size(); ++b)
+    kernels[b]->advance_and_remap(body(b), active, nodal.acceleration.data(), nodal.new_velocity.data(),
+                                  spin_only, update, mapped_velocity.data());
+  active.sum_over_ranks(mapped_velocity.data(), dim);
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    const double m = mass(i);
+    for (unsigned int d = 0; d < dim; ++d)
+      mapped_velocity[i * dim + d] *= m > 0. ? 1. / m : 0.;
+  }
+  for (const auto &condition : conditions)
+    condition->constrain_velocity(active, nodal.time + nodal.dt, nodal.dt, mapped_velocity);
+}
+
+template <int dim>
+void Continuum<dim>::deform_points()
+{
+  step_findings = {};
+  const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
+  const double *w = nodal.flux.data();
+  const char *spin_only = scheme.affine ? near_small_node.data() : nullptr;
+  for (std::size_t b = 0; b < members.size(); ++b)
+    if (remapped)
+      kernels[b]->deform(body(b), active, mapped_velocity.data(), w, spin_only, nodal.dt, pressure_update(b),
+                         step_findings);
+    else
+      kernels[b]->advance_and_deform(body(b), active, nodal.acceleration.data(), nodal.new_velocity.data(), w,
+                                     spin_only, update, pressure_update(b), step_findings);
+}
+
+template <int dim>
+void Continuum<dim>::book_balances(Ledger<dim> &book) const
+{
+  using S = Sums<dim>;
+  const std::vector<double> &end_velocity = remapped ? mapped_velocity : nodal.new_velocity;
+  double external = 0., gravity = 0., dissipation = 0., seepage = 0.;
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    if (!active.is_owned(i))
+      continue;
+    const double *sum = &nodal.sums[i * nodal.n_sums];
+    for (unsigned int d = 0; d < dim; ++d) {
+      const std::size_t row = i * dim + d;
+      const double v = 0.5 * (nodal.velocity[row] + end_velocity[row]);
+      const double force = sum[S::mass] * nodal.acceleration[row] - sum[S::force + d] -
+                           (nodal.contact_force.empty() ? 0. : nodal.contact_force[row]);
+      external += force * v;
+      gravity += sum[S::mass] * gravity_now[d] * v;
+      book.impulse[d] += nodal.dt * force;
+      book.gross_impulse += nodal.dt * std::abs(force);
+      if (saturated) {
+        dissipation += sum[S::resistance] * nodal.flux[row] * nodal.flux[row];
+        seepage -= sum[S::pressure_force + d] * nodal.flux[row];
+      }
+    }
+  }
+  book.fluid_outflow += step_findings.fluid_outflow;
+  book.fluid_squeezed += step_findings.fluid_squeezed;
+  book.external_work += nodal.dt * external;
+  book.gravity_work += nodal.dt * gravity;
+  book.seepage_dissipation += nodal.dt * dissipation;
+  book.seepage_work += nodal.dt * seepage;
+}
+
+template <int dim>
+void Continuum<dim>::move_tracers()
+{
+  const std::vector<double> &velocity = carrying_velocity();
+  for (const std::string &name : surfaces)
+    scene.surfaces.at(name).move(velocity, nodal.dt, scene.body(name).material().law().finite_strain(),
+                                 active);
+  if (scene.probes) {
+    scene.probes->locate(active, members);
+    scene.probes->move(velocity, nodal.dt, false, active);
+  }
+}
+
+template class Continuum<2>;
+template class Continuum<3>;
+} // namespace peat
