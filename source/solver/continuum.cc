@@ -26,7 +26,7 @@ Continuum<dim>::Continuum(const SchemeParameters &scheme, const Grid<dim> &grid,
   for (const auto &[name, tracers] : scene.surfaces)
     if (holds_body(name))
       surfaces.push_back(name);
-  for (const auto &condition : conditions)
+  for (const auto &condition : scene.conditions)
     if (condition->surface_of().empty() || holds_body(condition->surface_of())) {
       conditions.push_back(condition->copy());
       has_loads = has_loads || condition->has_body_force();
