@@ -92,11 +92,13 @@ SurfaceMesh<3> from_text(const std::string &text)
   Builder builder;
   std::istringstream lines(text);
   std::string line;
+  std::size_t n_loops = 0;
   for (unsigned int number = 1; std::getline(lines, line); ++number) {
     std::istringstream words(line);
     std::string word, rest;
     words >> word;
-    if (word == "endloop" && builder.n_corners != 0)
+    n_loops += word == "endloop";
+    if (word == "endloop" && (builder.n_corners != 0 || builder.mesh.facets.size() != n_loops))
       fail("line " + std::to_string(number) + ": a facet with more or less than three corners");
     if (word != "vertex")
       continue;

@@ -108,6 +108,19 @@ std::vector<BodyParameters<dim>> read_bodies(const Section &section,
 }
 
 template <int dim>
+std::vector<RigidBodyParameters<dim>> read_rigid_bodies(const Section &section,
+                                                        const std::vector<std::string> &body_names)
+{
+  std::vector<RigidBodyParameters<dim>> bodies;
+  for (const std::string &name : section.user_sections("RIGID BODY")) {
+    if (std::find(body_names.begin(), body_names.end(), name) != body_names.end())
+      section.subsection(name).fail("", "there is a body " + in_quotes(name) + " in 'Bodies' already");
+    bodies.emplace_back(section.subsection(name));
+  }
+  return bodies;
+}
+
+template <int dim>
 std::vector<std::unique_ptr<Condition<dim>>> read_conditions(const Section &section,
                                                              const std::vector<std::string> &bodies)
 {
@@ -189,6 +202,7 @@ Case<dim>::Case(const ParameterFile &file)
     : section(file.root()), title(read_title(file.root())), grid(file.root().subsection("Grid")),
       materials(read_materials(file.root().subsection("Materials"))),
       bodies(read_bodies<dim>(file.root().subsection("Bodies"), materials)),
+      rigid_bodies(read_rigid_bodies<dim>(file.root().subsection("Rigid bodies"), names(bodies))),
       conditions(read_conditions<dim>(file.root().subsection("Conditions"), names(bodies))),
       gravity(read_gravity<dim>(file.root())), method(read_method(file.root())),
       scheme(read_scheme(file.root())), implicit(file.root().subsection("Implicit solver")),
@@ -246,6 +260,10 @@ void Case<dim>::check(const Section &root) const
             .subsection(stage.name)
             .fail("K0", "with the law of material '" + body.material +
                             "' stress follows from strain alone; use 'linear elastic' or 'jaumann'");
+  if (method == Method::fem && !rigid_bodies.empty())
+    rigid_bodies.front().section.fail(
+        "", "rigid bodies act on material points by contact; finite elements do not "
+            "have it");
   for (const auto &condition : conditions)
     if (condition->has_fluid_source() && method == Method::mpm &&
         std::any_of(stages.begin(), stages.end(),

@@ -19,7 +19,7 @@ struct Simulation<dim>::Outputs
 {
   Outputs(const Case<dim> &parameters, const std::string &directory, const Scene<dim> &scene,
           const Grid<dim> &grid)
-      : statistics(directory, dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0)
+      : statistics(directory, scene, dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0)
   {
     if (scene.probes)
       probes = std::make_unique<ProbeWriter<dim>>(parameters, scene, grid, directory + "/probes.csv");

@@ -70,6 +70,8 @@ Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid)
       scene.probes->add(i, probe.point, dealii::Tensor<1, dim>());
     }
   }
+  for (const auto &rigid : parameters.rigid_bodies)
+    scene.rigid_bodies.push_back(std::make_unique<RigidBody<dim>>(rigid));
   scene.conditions = std::move(parameters.conditions);
   check_scene(parameters, scene, grid);
   return scene;

@@ -1,8 +1,53 @@
 #include <peat/simulation/statistics.h>
 
+#include <peat/simulation/table.h>
+
 namespace peat {
+namespace {
+template <typename Vector>
+void append(std::vector<double> &row, const Vector &vector)
+{
+  for (unsigned int d = 0; d < Vector::dimension; ++d)
+    row.push_back(vector[d]);
+}
+
+/// The columns of a rigid body.
 template <int dim>
-Statistics<dim>::Statistics(const std::string &directory, const bool is_first_rank)
+std::vector<std::string> rigid_columns(const std::string &name)
+{
+  std::vector<std::string> columns;
+  const auto add = [&](const std::string &quantity, const std::string &unit, const bool is_rotational) {
+    const unsigned int n = is_rotational && dim == 2 ? 1 : dim;
+    for (unsigned int d = 0; d < n; ++d)
+      columns.push_back(name + '/' + quantity + (n == 1 ? "" : std::string(" ") + "xyz"[d]) + " [" + unit +
+                        ']');
+  };
+  add("position", "m", false);
+  add("velocity", "m/s", false);
+  add("rotation", "rad", true);
+  add("spin", "rad/s", true);
+  add("force", "N", false);
+  add("moment", "N m", true);
+  return columns;
+}
+
+template <int dim>
+std::vector<double> rigid_row(const RigidBody<dim> &body)
+{
+  std::vector<double> row;
+  append(row, body.center());
+  append(row, body.velocity());
+  append(row, body.rotation_vector());
+  append(row, body.spin());
+  append(row, body.last_force);
+  append(row, body.last_moment);
+  return row;
+}
+} // namespace
+
+template <int dim>
+Statistics<dim>::Statistics(const std::string &directory, const Scene<dim> &scene, const bool is_first_rank)
+    : scene(scene)
 {
   if (!is_first_rank)
     return;
@@ -17,7 +62,11 @@ Statistics<dim>::Statistics(const std::string &directory, const bool is_first_ra
   for (const std::string quantity : {"momentum", "impulse", "center"})
     for (unsigned int d = 0; d < dim; ++d)
       file << ',' << quantity << ' ' << axes[d] << (quantity == "center" ? " [m]" : " [N s]");
-  file << ",fluid mass error,momentum error,energy error\n";
+  file << ",fluid mass error,momentum error,energy error";
+  for (const auto &rigid : scene.rigid_bodies)
+    for (const std::string &column : rigid_columns<dim>(rigid->name()))
+      file << ',' << csv_entry(column);
+  file << '\n';
 }
 
 template <int dim>
@@ -35,8 +84,11 @@ void Statistics<dim>::write(const double time, const unsigned long step, const d
   for (const auto &vector : {totals.momentum, book.impulse, totals.center})
     for (unsigned int d = 0; d < dim; ++d)
       file << ',' << vector[d];
-  file << ',' << balances.fluid_error << ',' << balances.momentum_error << ',' << balances.energy_error
-       << std::endl;
+  file << ',' << balances.fluid_error << ',' << balances.momentum_error << ',' << balances.energy_error;
+  for (const auto &rigid : scene.rigid_bodies)
+    for (const double value : rigid_row(*rigid))
+      file << ',' << value;
+  file << std::endl;
 }
 
 template class Statistics<2>;

@@ -72,6 +72,11 @@ Totals<dim> totals(const Scene<dim> &scene, MPI_Comm communicator)
     sum.center[d] = values[6 + 2 * d] / sum.mass;
   }
   sum.largest_speed = dealii::Utilities::MPI::max(sum.largest_speed, communicator);
+  // Every rank knows them.
+  for (const auto &rigid : scene.rigid_bodies) {
+    sum.kinetic_energy += rigid->kinetic_energy();
+    sum.momentum += rigid->momentum();
+  }
   return sum;
 }
 

@@ -304,6 +304,10 @@ BOOST_AUTO_TEST_CASE(wrong_files_are_refused)
   std::ofstream(file_name)
       << "solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nendloop\n";
   check_refused({"line 6", "three corners"});
+  std::ofstream(file_name)
+      << "solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 0 1 1\n"
+         "vertex 0 0 0\nvertex 0 0 1\nvertex 0 1 1\nendloop\n";
+  check_refused({"line 10", "three corners"});
   std::ofstream(file_name) << "solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\n";
   check_refused({"ends within a facet"});
   std::ofstream(file_name) << "solid a\nendsolid a\n";

@@ -70,6 +70,7 @@ public:
   explicit RigidBody(const RigidBodyParameters<dim> &parameters);
 
   const std::string &name() const { return parameters.name; }
+  const Section &section() const { return parameters.section; }
   bool is_prescribed() const { return parameters.prescribed; }
   /// As given, at the start.
   const Shape<dim> &reference_shape() const { return *parameters.shape; }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <peat/condition/condition.h>
+#include <peat/contact/rigid_body.h>
 #include <peat/grid/grid.h>
 #include <peat/material/material.h>
 #include <peat/points/body.h>
@@ -62,6 +63,7 @@ struct Case
   GridParameters<dim> grid;
   std::vector<std::unique_ptr<Material>> materials;
   std::vector<BodyParameters<dim>> bodies;
+  std::vector<RigidBodyParameters<dim>> rigid_bodies;
   std::vector<std::unique_ptr<Condition<dim>>> conditions;
   Function gravity;
   Method method;

@@ -11,13 +11,14 @@ template <int dim>
 class Statistics
 {
 public:
-  /// Only rank 0 opens the file.
-  Statistics(const std::string &directory, bool is_first_rank);
+  /// Only rank 0 opens the file. `scene` must live as long as this.
+  Statistics(const std::string &directory, const Scene<dim> &scene, bool is_first_rank);
 
   void write(double time, unsigned long step, double dt, const std::string &limit, const Totals<dim> &totals,
              const Balances<dim> &balances);
 
 private:
+  const Scene<dim> &scene;
   std::ofstream file;
 };
 } // namespace peat

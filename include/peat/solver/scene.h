@@ -1,6 +1,7 @@
 #pragma once
 
 #include <peat/condition/condition.h>
+#include <peat/contact/rigid_body.h>
 #include <peat/points/body.h>
 #include <peat/points/tracers.h>
 
@@ -20,6 +21,7 @@ struct Scene
   std::map<std::string, Tracers<dim>> surfaces;
   std::unique_ptr<Tracers<dim>> probes;
   Function gravity;
+  std::vector<std::unique_ptr<RigidBody<dim>>> rigid_bodies;
 
   bool is_saturated() const;
   bool has_body_force() const;

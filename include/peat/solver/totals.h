@@ -5,7 +5,7 @@
 #include <deal.II/base/tensor.h>
 
 namespace peat {
-/// Sums over all points of all bodies and ranks.
+/// Sums over all points of all bodies and ranks. Free rigid bodies count in kinetic energy and momentum.
 template <int dim>
 struct Totals
 {
