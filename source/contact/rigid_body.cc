@@ -70,7 +70,7 @@ Tensor3 vector_of(const dealii::Tensor<2, 3> &R)
       longest = d;
   Tensor3 axis;
   for (unsigned int d = 0; d < 3; ++d)
-    axis[d] = 0.5 * (R[d][longest] + (d == longest ? 1. : 0.));
+    axis[d] = 0.25 * (R[d][longest] + R[longest][d]) + (d == longest ? 0.5 : 0.);
   return angle / axis.norm() * (axis * twice_sine < 0. ? -axis : axis);
 }
 

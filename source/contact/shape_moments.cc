@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-// The shape's bounds are divided into boxes, and each is cut with the shape. The cut gives volume and
-// centroid; the moments about that centroid are those of a box that a plane cuts, with the outward normal and
-// through the point of the surface that the cut found.
+// A shape whose surface is a mesh has exact moments. Else the shape's bounds are divided into boxes, and each
+// is cut with the shape. The cut gives volume and centroid; the moments about that centroid are those of a
+// box that a plane cuts, with the outward normal and through the point of the surface that the cut found.
 
 namespace peat {
 namespace {
@@ -58,11 +58,41 @@ covariance_behind_plane(const dealii::Point<dim> &lower, const dealii::Point<dim
   const auto centroid = first / volume;
   return second / volume - outer_product(centroid, centroid);
 }
+
+/// Closed facets that are counter-clockwise as seen from outside: each makes a simplex with one place, and
+/// volumes and moments of these, with their signs, add up to those of the body.
+template <int dim>
+ShapeMoments<dim> moments_of(const SurfaceMesh<dim> &mesh, const dealii::Point<dim> &origin)
+{
+  ShapeMoments<dim> result;
+  dealii::Tensor<1, dim> first;
+  dealii::Tensor<2, dim> second;
+  for (const auto &facet : mesh.facets) {
+    dealii::Tensor<2, dim> corners;
+    dealii::Tensor<1, dim> sum;
+    for (unsigned int i = 0; i < dim; ++i) {
+      corners[i] = mesh.vertices[facet[i]] - origin;
+      sum += corners[i];
+    }
+    const double volume = determinant(corners) / (dim == 2 ? 2. : 6.);
+    result.volume += volume;
+    first += volume / (dim + 1) * sum;
+    second += volume / ((dim + 1) * (dim + 2)) * (transpose(corners) * corners + outer_product(sum, sum));
+  }
+  const dealii::Tensor<1, dim> middle = first / result.volume;
+  result.centroid = origin + middle;
+  result.second = second - result.volume * outer_product(middle, middle);
+  return result;
+}
 } // namespace
 
 template <int dim>
 ShapeMoments<dim> moments(const Shape<dim> &shape)
 {
+  SurfaceMesh<dim> mesh;
+  if (shape.append_facets(mesh))
+    return moments_of(mesh, shape.bounds().center());
+
   constexpr unsigned int n = dim == 2 ? 256 : 40, n_boxes = dim == 2 ? n * n : n * n * n;
   const Bounds<dim> box = shape.bounds();
   const dealii::Point<dim> origin = box.center();

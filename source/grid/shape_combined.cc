@@ -184,6 +184,16 @@ public:
   bool is_convex() const override { return shape->is_convex(); }
   Bounds<dim> bounds() const override { return image(shape->bounds(), forward, from, to); }
 
+  bool append_facets(SurfaceMesh<dim> &mesh) const override
+  {
+    const std::size_t first = mesh.vertices.size();
+    if (!shape->append_facets(mesh))
+      return false;
+    for (auto x = mesh.vertices.begin() + first; x != mesh.vertices.end(); ++x)
+      *x = to + forward * (*x - from);
+    return true;
+  }
+
   void append_bounds_of_parts(std::vector<Bounds<dim>> &parts) const override
   {
     std::vector<Bounds<dim>> before;

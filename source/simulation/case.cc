@@ -279,6 +279,10 @@ void Case<dim>::check(const Section &root) const
             .subsection(stage.name)
             .fail("K0", "with the law of material '" + body.material +
                             "' stress follows from strain alone; use 'linear elastic' or 'jaumann'");
+  if (method == Method::fem && !rigid_bodies.empty())
+    rigid_bodies.front().section.fail(
+        "", "rigid bodies act on material points by contact; finite elements do not "
+            "have it");
   for (const auto &condition : conditions)
     if (condition->has_fluid_source() && method == Method::mpm &&
         std::any_of(stages.begin(), stages.end(),

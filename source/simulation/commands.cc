@@ -86,6 +86,13 @@ int check(const ParameterFile &file, const RunOptions &options, MPI_Comm communi
   for (const auto &body : scene.bodies)
     text << "body '" << body->name() << "': " << body->n_global_points() << " points of '"
          << body->material().name() << "', " << body->layout().n_columns << " values each\n";
+  for (const auto &rigid : scene.rigid_bodies) {
+    text << "rigid body '" << rigid->name() << "': ";
+    if (rigid->is_prescribed())
+      text << "prescribed motion\n";
+    else
+      text << rigid->mass() << (dim == 2 ? " kg/m\n" : " kg\n");
+  }
   text << "cells: " << grid.triangulation().n_global_active_cells() << ", of them " << n_active
        << " hold points\n";
 

@@ -63,6 +63,17 @@ public:
     return patch;
   }
 
+  /// A line or a triangle.
+  Patch &add_facet()
+  {
+    Patch &patch = add_patch();
+    if (patch_dim == 2) {
+      patch.reference_cell = dealii::ReferenceCells::get_simplex<patch_dim>();
+      patch.data.reinit(n_components, patch_dim + 1);
+    }
+    return patch;
+  }
+
   /// Fill in the data of one vertex from a row of numbers.
   void set(Patch &patch, const unsigned int vertex, const double *row) const
   {
@@ -147,6 +158,8 @@ Pictures<dim>::Pictures(const std::string &directory, const Scene<dim> &scene, M
     std::filesystem::create_directories(directory + "/pictures", error);
   if (dealii::Utilities::MPI::max(error.value(), communicator) != 0)
     throw InputError("cannot make the directory '" + directory + "/pictures'");
+  for (const auto &rigid : scene.rigid_bodies)
+    surfaces.push_back(surface_mesh(rigid->reference_shape()));
 }
 
 template <int dim>
@@ -155,6 +168,8 @@ void Pictures<dim>::write(const double time, const ActiveNodes<dim> &nodes, cons
   write_grid(time, nodes, fields);
   for (const auto &body : scene.bodies)
     write_points(time, *body);
+  for (std::size_t r = 0; r < scene.rigid_bodies.size(); ++r)
+    write_surface(time, *scene.rigid_bodies[r], surfaces[r]);
   ++n_times;
   const bool written = dealii::Utilities::MPI::this_mpi_process(communicator) != 0 || write_list();
   if (dealii::Utilities::MPI::min(int(written), communicator) == 0)
@@ -272,6 +287,24 @@ void Pictures<dim>::write_points(const double time, const Body<dim> &body)
     patch.vertices[0] = body.position(handle);
     file.set(patch, 0, row.data());
   }
+  file.write(add_entry(time, body.name()), time, n_times, communicator);
+}
+
+template <int dim>
+void Pictures<dim>::write_surface(const double time, const RigidBody<dim> &body,
+                                  const SurfaceMesh<dim> &surface)
+{
+  PatchFile<dim - 1, dim> file({{"velocity", "m/s", consecutive(0, dim)}}, surface.facets.size());
+  // All ranks know the surface, the first one writes it.
+  if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0)
+    for (const auto &facet : surface.facets) {
+      auto &patch = file.add_facet();
+      for (unsigned int v = 0; v < dim; ++v) {
+        patch.vertices[v] = body.to_present(surface.vertices[facet[v]]);
+        const dealii::Tensor<1, dim> velocity = body.velocity_at(patch.vertices[v]);
+        file.set(patch, v, velocity.begin_raw());
+      }
+    }
   file.write(add_entry(time, body.name()), time, n_times, communicator);
 }
 

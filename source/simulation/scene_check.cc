@@ -1,3 +1,4 @@
+#include <peat/grid/surface_mesh.h>
 #include <peat/simulation/scene_check.h>
 
 #include <deal.II/base/mpi.h>
@@ -47,6 +48,34 @@ void check_bodies(const Case<dim> &parameters, const Scene<dim> &scene, const Gr
         second.section.fail("Shape", "bodies '" + first.name + "' and '" + second.name +
                                          "' overlap; cut one out of the other with difference(..., ...)");
     }
+}
+
+/// Whether the shape of a body at the start and a rigid body share more than what touches: places on the
+/// surface of one deep in the other, or points deep in the rigid one.
+template <int dim>
+bool overlap(const Body<dim> &body, const RigidBody<dim> &rigid, const double depth)
+{
+  if (!body.shape()->bounds().overlaps(rigid.bounds(), depth))
+    return false;
+  for (const std::uint32_t handle : body.handles())
+    if (rigid.distance(body.position(handle)) < -depth)
+      return true;
+  if (!body.shape()->is_distance())
+    return false;
+  const SurfaceMesh<dim> surface = surface_mesh(rigid.reference_shape());
+  return std::any_of(surface.vertices.begin(), surface.vertices.end(),
+                     [&](const dealii::Point<dim> &x) { return body.shape()->distance(x) < -depth; });
+}
+
+template <int dim>
+void check_rigid_bodies(const Scene<dim> &scene, const Grid<dim> &grid)
+{
+  constexpr double share_of_cell = 0.02;
+  for (const auto &rigid : scene.rigid_bodies)
+    for (const auto &body : scene.bodies)
+      if (on_any_rank(overlap(*body, *rigid, share_of_cell * grid.smallest_cell_size()), grid.communicator()))
+        rigid->section().fail("Shape", "rigid body '" + rigid->name() + "' and body '" + body->name() +
+                                           "' overlap at the start");
 }
 
 /// Whether any node on a face of the mesh, or of the whole mesh (boundary -1), within the bounds satisfies
@@ -246,6 +275,7 @@ template <int dim>
 void check_scene(const Case<dim> &parameters, const Scene<dim> &scene, const Grid<dim> &grid)
 {
   check_bodies(parameters, scene, grid);
+  check_rigid_bodies(scene, grid);
   try {
     check_conditions(scene, grid);
   } catch (const NumericalError &error) {

@@ -70,6 +70,7 @@ public:
   explicit RigidBody(const RigidBodyParameters<dim> &parameters);
 
   const std::string &name() const { return parameters.name; }
+  const Section &section() const { return parameters.section; }
   bool is_prescribed() const { return parameters.prescribed; }
   /// As given, at the start.
   const Shape<dim> &reference_shape() const { return *parameters.shape; }
@@ -127,9 +128,9 @@ public:
   /// Components that are not free do not feel it.
   void add_impulse(const Vector &impulse, const dealii::Point<dim> &x) { add_impulse(wrench(impulse, x)); }
   void add_impulse(const Generalised &impulse);
-  /// Move. Second order in time in free flight, where translation is exact under constant gravity, and
-  /// angular momentum is kept to round-off; in a step with impulses the translation is that of symplectic
-  /// Euler, as the points' is.
+  /// Move. Second order in time in free flight, where translation is exact under constant gravity, and a body
+  /// that turns freely keeps its energy and angular momentum to round-off. In a step with impulses the
+  /// translation is that of symplectic Euler, as the points' is.
   void end_step();
 
   /// What bodies in contact exert on it, about its centre; set by the contact, for output [N], [N m].

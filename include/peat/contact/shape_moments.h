@@ -16,8 +16,8 @@ struct ShapeMoments
   dealii::Tensor<2, dim> second;
 };
 
-/// The shape must be bounded. Exact up to round-off for axis-parallel boxes and closed meshes of triangles,
-/// else to about 1e-6 of the largest moment where distance() is a distance.
+/// The shape must be bounded. Exact up to round-off where the surface is a mesh, to 1e-9 for axis-parallel
+/// boxes, else to about 1e-6 of the largest moment where distance() is a distance.
 template <int dim>
 ShapeMoments<dim> moments(const Shape<dim> &shape);
 } // namespace peat

@@ -2,6 +2,7 @@
 
 #include <peat/base/error.h>
 #include <peat/base/expression.h>
+#include <peat/grid/surface_mesh.h>
 
 #include <deal.II/base/point.h>
 #include <deal.II/base/tensor.h>
@@ -61,6 +62,10 @@ public:
 
   /// An axis-parallel box that contains the shape [m]; infinite where nothing better is known.
   virtual Bounds<dim> bounds() const = 0;
+
+  /// Appends facets that are the surface exactly, counter-clockwise as seen from outside. False if there are
+  /// none.
+  virtual bool append_facets(SurfaceMesh<dim> &) const { return false; }
 
   /// The bounds of the shapes of which this one is made: their sides are where axis-parallel faces are to be
   /// expected.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <peat/grid/surface_mesh.h>
 #include <peat/solver/explicit_mpm.h>
 
 #include <map>
@@ -8,8 +9,8 @@
 
 namespace peat {
 /// Pictures for ParaView: `solution.pvd`, which lists for each time `pictures/grid-0003.vtu` (the cells that
-/// hold material) and `pictures/BODY-0003.vtu` for each body (its points). Each file is written by all ranks
-/// together, compressed, in single precision.
+/// hold material) and `pictures/BODY-0003.vtu` for each body (its points; of a rigid body its surface). Each
+/// file is written by all ranks together, compressed, in single precision.
 ///
 /// The grid shows velocity, displacement and effective stress of all bodies together, and pressure and flux
 /// (as the last step left it; zero if the nodes were numbered anew since) where there is pore fluid; all but
@@ -37,6 +38,7 @@ private:
 
   void write_grid(double time, const ActiveNodes<dim> &nodes, const NodalFields<dim> &fields);
   void write_points(double time, const Body<dim> &body);
+  void write_surface(double time, const RigidBody<dim> &body, const SurfaceMesh<dim> &surface);
   /// "pictures/NAME-0003.vtu", noted for solution.pvd.
   std::string add_entry(double time, const std::string &name);
   bool write_list() const;
@@ -45,6 +47,8 @@ private:
   const Scene<dim> &scene;
   MPI_Comm communicator;
   unsigned int n_times = 0;
+  /// Of the rigid bodies, where they were at the start.
+  std::vector<SurfaceMesh<dim>> surfaces;
   /// What the name of a part (the grid or a body) is in file names, and its number.
   struct Part
   {
