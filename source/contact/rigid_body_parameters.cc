@@ -78,7 +78,8 @@ RigidBodyParameters<dim>::RigidBodyParameters(Section section) : section(section
   check_shape(section, name, *shape);
   prescribed = motion == "prescribed";
   const std::vector<std::string> of_free = {
-      "Density", "Mass", "Moment of inertia", "Free components", "Initial velocity", "Initial spin"};
+      "Density", "Mass", "Moment of inertia", "Free components", "Initial velocity",
+      "Initial spin", "Fall height"};
   const std::vector<std::string> of_prescribed = {"Velocity", "Displacement", "Spin"};
   for (const std::string &key : prescribed ? of_free : of_prescribed)
     if (section.has(key))
@@ -108,6 +109,9 @@ void RigidBodyParameters<dim>::read_free()
               "The components of a free body's motion that are free; the "
               "others stay as at the start.");
   section.add("Initial velocity", velocity_values, dim, any("m/s"), "Of a free body's centre.");
+  section.add("Fall height", fall_height, nonnegative("m"),
+              "Adds the velocity of a free fall from this height, along gravity at the time when the first "
+              "stage with motion begins.");
   section.add("Initial spin", spin_values, n_rotations, any("rad/s"),
               dim == 2 ? "Of a free body; counter-clockwise." : "Of a free body, about x, y, z.");
   inertia = as_array < dim == 2 ? 1 : 6 > (moments);

@@ -28,6 +28,11 @@ BodyParameters<dim>::BodyParameters(Section section, const std::vector<std::stri
   section.add("Points per cell", points_per_direction, between(1, 16),
               "Material points per cell in each direction.");
   section.add("Initial velocity", initial_velocity, dim, "m/s", "Velocity at the start.");
+  section.add("Fall height", fall_height, nonnegative("m"),
+              "Adds the velocity of a free fall from this height, along gravity at the time when the body "
+              "comes in.");
+  section.add("From stage", from_stage,
+              "The stage from whose start on the body takes part; empty: from the first one on.");
   section.add("Initial stress", initial_stress, n_stress, "Pa",
               dim == 2 ? "Effective stress at the start: xx, yy, zz, xy; tension positive."
                        : "Effective stress at the start: xx, yy, zz, xy, yz, zx; tension positive.");
@@ -40,15 +45,13 @@ BodyParameters<dim>::BodyParameters(Section section, const std::vector<std::stri
 template <int dim>
 Body<dim>::Body(const BodyParameters<dim> &parameters, const Material &material, const Grid<dim> &grid,
                 const SchemeFields &scheme)
-    : body_name(parameters.name), body_material(material), grid(grid), columns(dim, material, scheme),
+    : parameters(parameters), gauss_points(scheme.gauss_points), body_material(material), grid(grid), columns(dim, material, scheme),
       initial_shape(parameters.shape), particles(grid.triangulation(), grid.mapping(), columns.n_columns),
       count_in_cell(grid.n_local_cells(), 0)
 {
-  seed(parameters, scheme.gauss_points);
-  attach_storage();
-  initial_number = particles.n_global_particles();
+  enter();
   if (initial_number == 0)
-    parameters.section.fail("Shape", "body '" + body_name +
+    parameters.section.fail("Shape", "body '" + parameters.name +
                                          "' has no material points: its shape lies outside the mesh "
                                          "or is smaller than the spacing of points");
 }
@@ -103,7 +106,7 @@ void fill_row(std::vector<double> &row, const Layout &layout, const Material &ma
   row[layout.mass] = material.density() * part.volume;
   row[layout.volume] = part.volume;
   for (unsigned int d = 0; d < dim; ++d)
-    row[layout.velocity + d] = parameters.initial_velocity.value(x, 0., d);
+    row[layout.velocity + d] = parameters.initial_velocity.value(x, 0., d) + parameters.fall_velocity[d];
   if (layout.velocity_gradient >= 0)
     for (unsigned int e = 0; e < dim; ++e) {
       // Exact for velocities that are linear in place, but for round-off.
@@ -187,7 +190,7 @@ std::vector<PartOfCell<dim>> gauss_parts(const Shape<dim> &shape, const Grid<dim
 } // namespace
 
 template <int dim>
-void Body<dim>::seed(const BodyParameters<dim> &parameters, const unsigned int gauss_points)
+void Body<dim>::seed()
 {
   const unsigned int n = gauss_points > 0 ? gauss_points : parameters.points_per_direction;
   const unsigned int n_boxes = dim == 2 ? n * n : n * n * n;
@@ -233,6 +236,24 @@ void Body<dim>::seed(const BodyParameters<dim> &parameters, const unsigned int g
       throw InputError(one);
   number_points(n_local);
   particles.update_cached_numbers();
+}
+
+template <int dim>
+void Body<dim>::enter()
+{
+  seed();
+  attach_storage();
+  initial_number = particles.n_global_particles();
+}
+
+template <int dim>
+void Body<dim>::withdraw()
+{
+  particles.clear_particles();
+  particles.update_cached_numbers();
+  moved_points.clear();
+  attach_storage();
+  initial_number = 0;
 }
 
 template <int dim>
@@ -319,7 +340,7 @@ typename Body<dim>::Relocation Body<dim>::relocate(const double time)
     return result;
   const auto complain = [&](const std::uint32_t handle, const std::string &what) {
     std::ostringstream message;
-    message << "point " << id(handle) << " of body '" << body_name << "' " << what << " at ("
+    message << "point " << id(handle) << " of body '" << name() << "' " << what << " at ("
             << position(handle) << "), t = " << time << " s";
     throw NumericalError(message.str());
   };
@@ -359,7 +380,7 @@ void Body<dim>::synchronise(const double time)
   attach_storage();
   if (particles.n_global_particles() != initial_number) {
     std::ostringstream message;
-    message << "body '" << body_name << "' lost " << initial_number - particles.n_global_particles()
+    message << "body '" << name() << "' lost " << initial_number - particles.n_global_particles()
             << " of its points when they were handed to other ranks, t = " << time << " s";
     throw NumericalError(message.str());
   }

@@ -236,6 +236,76 @@ Case<dim>::Case(const ParameterFile &file)
     return;
   file.refuse_unknown_entries();
   check(file.root());
+  check_contacts();
+  set_fall_velocities();
+}
+
+template <int dim>
+void Case<dim>::check_contacts() const
+{
+  for (const auto &contact : contacts)
+    if (method == Method::fem && !contact.law->ties())
+      throw InputError(contact.origin, "finite elements tie bodies where they meet, and have no other contact; "
+                                       "set 'Law = tied', or 'Method = mpm'");
+  for (const auto &contact : contacts)
+    for (const auto &body : bodies)
+      if ((contact.first == body.name || contact.second == body.name) && !body.shape->is_distance())
+        throw InputError(contact.origin, "contact '" + contact.name + "' needs to know where the surface of '" +
+                                             body.name + "' is, which the shape 'inside' does not tell");
+  for (const auto &body : bodies) {
+    if (body.from_stage.empty())
+      continue;
+    const std::vector<std::string> known = names(stages);
+    if (std::find(known.begin(), known.end(), body.from_stage) == known.end())
+      body.section.fail("From stage", "there is no stage " + in_quotes(body.from_stage) +
+                                          suggestion(body.from_stage, known));
+    if (method == Method::fem && body.from_stage != stages.front().name)
+      body.section.fail("From stage", "finite elements have all bodies from the start");
+  }
+}
+
+template <int dim>
+std::string Case<dim>::entry_stage(const BodyParameters<dim> &body) const
+{
+  return stages.empty() || body.from_stage == stages.front().name ? "" : body.from_stage;
+}
+
+template <int dim>
+void Case<dim>::set_fall_velocities()
+{
+  const auto fall_velocity = [&](const double height, const double time, const Section &where) {
+    const double origin[3] = {0., 0., 0.};
+    dealii::Tensor<1, dim> g;
+    for (unsigned int d = 0; d < dim; ++d)
+      g[d] = gravity.value(origin, time, d);
+    if (g.norm() == 0.)
+      where.fail("Fall height", "there is no gravity at t = " + to_text(time) + " s to fall in");
+    return std::sqrt(2. * height / g.norm()) * g;
+  };
+  double first_motion = 0., start = 0.;
+  for (const auto &stage : stages) {
+    if (stage.solver != StageParameters::Solver::static_state) {
+      first_motion = start;
+      break;
+    }
+    start += stage.duration;
+  }
+  for (auto &body : bodies) {
+    double entry = 0.;
+    for (const auto &stage : stages) {
+      if (stage.name == entry_stage(body))
+        break;
+      entry += entry_stage(body).empty() ? 0. : stage.duration;
+    }
+    if (body.fall_height > 0.)
+      body.fall_velocity = fall_velocity(body.fall_height, entry, body.section);
+  }
+  for (auto &body : rigid_bodies)
+    if (body.fall_height > 0.) {
+      const auto v = fall_velocity(body.fall_height, first_motion, body.section);
+      for (unsigned int d = 0; d < dim; ++d)
+        body.initial_velocity[d] += body.is_free[d] ? v[d] : 0.;
+    }
 }
 
 template <int dim>

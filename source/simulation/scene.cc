@@ -76,6 +76,9 @@ Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid)
   scene.contacts = parameters.contacts;
   scene.conditions = std::move(parameters.conditions);
   check_scene(parameters, scene, grid);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    if (!parameters.entry_stage(parameters.bodies[b]).empty())
+      scene.bodies[b]->withdraw();
   return scene;
 }
 

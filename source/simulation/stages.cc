@@ -1,3 +1,4 @@
+#include <peat/simulation/contact_events.h>
 #include <peat/simulation/simulation.h>
 #include <peat/solver/rest_pressure.h>
 
@@ -9,15 +10,34 @@ namespace peat {
 template <int dim>
 void Simulation<dim>::run_stage(const StageParameters &stage, const double start)
 {
+  bring_in_bodies(stage);
   const bool implicit = parameters.method == Method::fem || stage.solver != StageParameters::Solver::dynamic;
   outputs->plan(parameters.output, comparison, recorder, start, start + stage.duration,
                 stage.solver == StageParameters::Solver::quasi_static);
+  if (parameters.method == Method::mpm && implicit && !scene.contacts.empty())
+    log.line("stage '" + stage.name +
+             "': implicit, so bodies are tied where they meet, and rigid bodies do not act");
   if (stage.solver == StageParameters::Solver::static_state)
     run_static_stage(stage, start);
   else if (implicit)
     run_implicit_stage(stage, start);
   else
     run_explicit_stage(stage, start);
+}
+
+template <int dim>
+void Simulation<dim>::bring_in_bodies(const StageParameters &stage)
+{
+  bool any = false;
+  const Totals<dim> before = totals(scene, communicator);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    if (parameters.entry_stage(parameters.bodies[b]) == stage.name) {
+      scene.bodies[b]->enter();
+      log.line("body '" + scene.bodies[b]->name() + "' comes in");
+      any = true;
+    }
+  if (any)
+    balances->admit(before, totals(scene, communicator));
 }
 
 template <int dim>
@@ -174,6 +194,7 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
   solver = std::move(made);
   mpm.prepare();
   begin_stage(stage, mpm.stable_step());
+  ContactEvents<dim> events(log);
 
   // Between two events the step is constant, unless the stable step has changed by then.
   constexpr unsigned int steps_between_checks = 100;
@@ -202,6 +223,7 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
     for (unsigned int i = 0; i < n_now && !stopped; ++i) {
       mpm.step(dt);
       steps.add(dt);
+      events.note(mpm.time(), dt, scene);
       ++steps_since_check;
       now = mpm.time();
       stopped = interrupted();
@@ -218,6 +240,7 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
     log.progress(now / planned_end, now, steps.n_steps,
                  steps.n_steps * double(scene.n_global_points()) / std::max(1e-9, wall.time_loop));
   }
+  events.summarise(scene);
 }
 
 template unsigned long Simulation<2>::unknowns_of_solver() const;

@@ -123,6 +123,17 @@ void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MP
     energy_error = std::abs(numerical_dissipation) / energy_scale;
 }
 
+template <int dim>
+void Balances<dim>::admit(const Totals<dim> &before, const Totals<dim> &after)
+{
+  start.mass += after.mass - before.mass;
+  start.fluid_volume += after.fluid_volume - before.fluid_volume;
+  start.kinetic_energy += after.kinetic_energy - before.kinetic_energy;
+  start.elastic_energy += after.elastic_energy - before.elastic_energy;
+  start.fluid_energy += after.fluid_energy - before.fluid_energy;
+  start.momentum += after.momentum - before.momentum;
+}
+
 template struct Totals<2>;
 template struct Totals<3>;
 template Totals<2> totals<2>(const Scene<2> &, MPI_Comm);

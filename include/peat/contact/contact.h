@@ -25,8 +25,8 @@ struct ContactParameters
   };
   /// Where the normal of two deformable bodies comes from.
   enum class Normal {
-    regression, ///< the plane that separates their points (Nairn, Hammerquist & Smith 2020)
-    gradient,   ///< the gradients of their volumes (Bardenhagen et al. 2001)
+    regression, ///< the plane that separates their points (Nairn2020)
+    gradient,   ///< the gradients of their volumes (Bardenhagen2001)
     prescribed
   };
 

@@ -33,7 +33,8 @@ struct RigidBodyParameters
   /// shape.
   std::array<double, dim == 2 ? 1 : 6> inertia{};
   std::array<bool, n_motions> is_free{};
-  std::array<double, dim> initial_velocity{};
+  std::array<double, dim> initial_velocity{}; ///< [m/s]
+  double fall_height = 0.;                    ///< [m]; whoever knows gravity adds it to the velocity
   std::array<double, n_rotations> initial_spin{};
 
   // Of a prescribed one: functions of time.

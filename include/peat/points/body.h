@@ -26,6 +26,10 @@ struct BodyParameters
   std::shared_ptr<const Shape<dim>> shape;
   unsigned int points_per_direction = 2;
   Function initial_velocity;
+  double fall_height = 0.; ///< [m]
+  /// Velocity that a fall from there gives, to be set by who knows gravity; added to the initial velocity.
+  dealii::Tensor<1, dim> fall_velocity;
+  std::string from_stage; ///< "": from the start
   Function initial_stress;
   Function initial_pressure;
 };
@@ -51,7 +55,7 @@ public:
   Body(const BodyParameters<dim> &parameters, const Material &material, const Grid<dim> &grid,
        const SchemeFields &scheme);
 
-  const std::string &name() const { return body_name; }
+  const std::string &name() const { return parameters.name; }
   const Material &material() const { return body_material; }
   const Layout &layout() const { return columns; }
   const dealii::Particles::ParticleHandler<dim> &handler() const { return particles; }
@@ -94,17 +98,22 @@ public:
   /// order again. Collective. Throws NumericalError if a point gets lost.
   void synchronise(double time);
 
+  /// Take all points out, until enter() puts them where they were at the start. Collective.
+  void withdraw();
+  void enter();
+
   /// Check that the global number of points is what it was at the start.
   dealii::types::particle_index n_points_at_start() const { return initial_number; }
 
 private:
-  void seed(const BodyParameters<dim> &parameters, unsigned int gauss_points);
+  void seed();
   /// Make the points' ids, which so far count from 0 on each rank, unique over the ranks.
   void number_points(std::uint32_t n_local);
   void rebuild_slices();
   void attach_storage();
 
-  const std::string body_name;
+  const BodyParameters<dim> parameters;
+  const unsigned int gauss_points; ///< see SchemeFields
   const Material &body_material;
   const Grid<dim> &grid;
   const Layout columns;

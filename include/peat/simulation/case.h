@@ -78,7 +78,12 @@ struct Case
   OutputParameters output;
   CompareParameters compare;
 
+  /// Name of the stage with which a body comes in, "" for those that are there from the start.
+  std::string entry_stage(const BodyParameters<dim> &body) const;
+
 private:
   void check(const Section &root) const;
+  void check_contacts() const;
+  void set_fall_velocities();
 };
 } // namespace peat

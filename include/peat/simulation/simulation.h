@@ -67,6 +67,7 @@ private:
   void run_explicit_stage(const StageParameters &stage, double start);
   void run_implicit_stage(const StageParameters &stage, double start);
   void run_static_stage(const StageParameters &stage, double start);
+  void bring_in_bodies(const StageParameters &stage);
   void begin_stage(const StageParameters &stage, const StableStep &step);
   void make_up_solver(typename UpSolver<dim>::Method method, double start);
   unsigned long unknowns_of_solver() const;

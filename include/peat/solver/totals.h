@@ -35,6 +35,9 @@ public:
   /// Collective; `ledger` is this rank's share.
   void update(const Totals<dim> &now, const Ledger<dim> &ledger, MPI_Comm communicator);
 
+  /// Bodies have come in, which changed the totals.
+  void admit(const Totals<dim> &before, const Totals<dim> &after);
+
   const Ledger<dim> &ledger() const { return book; }
   /// Relative errors; the largest so far.
   double mass_error = 0.;
@@ -45,7 +48,7 @@ public:
   double numerical_dissipation = 0.;
 
 private:
-  const Totals<dim> start;
+  Totals<dim> start;
   Ledger<dim> book;
   double momentum_scale = 0.;
   double energy_scale = 0.;

@@ -1,0 +1,60 @@
+#include <peat/simulation/contact_events.h>
+
+#include <sstream>
+
+namespace peat {
+template <int dim>
+void ContactEvents<dim>::note(const double time, const double dt, const Scene<dim> &scene)
+{
+  // Bodies that ring part and meet many times.
+  constexpr unsigned int most_told = 6;
+  for (const auto &[name, state] : scene.contact_states) {
+    Record &record = records[name];
+    const bool touches = state.normal_force > 0.;
+    if (touches != record.touches) {
+      record.touches = touches;
+      ++record.n_events;
+      if (record.n_told < most_told) {
+        ++record.n_told;
+        std::ostringstream text;
+        text << "contact '" << name << "': " << (touches ? "touch" : "release") << " at t = " << time << " s";
+        if (record.n_told == most_told)
+          text << "; more such events are not listed";
+        log.line(text.str());
+      }
+    }
+    if (state.normal_force > record.largest_force) {
+      record.largest_force = state.normal_force;
+      record.time_of_largest = time;
+    }
+    record.impulse += dt * state.normal_force;
+    record.smallest_gap = std::min(record.smallest_gap, state.gap);
+  }
+}
+
+template <int dim>
+void ContactEvents<dim>::summarise(const Scene<dim> &scene)
+{
+  for (const auto &[name, record] : records) {
+    std::ostringstream text;
+    text << "contact '" << name << "': ";
+    if (record.largest_force == 0.)
+      text << "bodies do not touch";
+    else
+      text << "largest normal force " << record.largest_force << " N at t = " << record.time_of_largest
+           << " s, normal impulse " << record.impulse << " N s, deepest overlap "
+           << std::max(0., -record.smallest_gap) << " m, in the end "
+           << (record.touches ? "in contact" : "apart");
+    log.line(text.str());
+  }
+  for (const auto &rigid : scene.rigid_bodies) {
+    std::ostringstream text;
+    text << "rigid body '" << rigid->name() << "': in the end at (" << rigid->center() << "), velocity ("
+         << rigid->velocity() << ") m/s";
+    log.line(text.str());
+  }
+}
+
+template class ContactEvents<2>;
+template class ContactEvents<3>;
+} // namespace peat
