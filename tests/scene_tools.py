@@ -1,6 +1,7 @@
 """What the scripts that run scenes share: running and reading, bounds, a little arithmetic, the command line."""
 import argparse
 import base64
+import bisect
 import csv
 import json
 import math
@@ -222,7 +223,7 @@ def amplitude(t, y, w):
 
 
 def interpolate(x, xs, ys):
-    k = min(max(1, next((i for i, v in enumerate(xs) if v >= x), len(xs) - 1)), len(xs) - 1)
+    k = min(max(1, bisect.bisect_left(xs, x)), len(xs) - 1)
     share = (x - xs[k - 1]) / (xs[k] - xs[k - 1])
     return (1. - share) * ys[k - 1] + share * ys[k]
 
