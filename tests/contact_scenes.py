@@ -393,9 +393,9 @@ def i2_errors(c, scene, k, cells, settings, area, axis="y"):
     s, h = History(run, "impact"), 10. / cells
     speed = s.table["block/velocity " + axis]
     v_error = max(abs(-v - interpolate(t, times, v_of)) for t, v in zip(s.t, speed) if t < 0.95 * lost)
-    # Until the front comes back from the base: averages blur it, and so does the inverse transform.
+    # Until shortly before the front comes back from the base: averages blur it, and the inverse transform rings.
     f_error = max(abs(f / area(h) - interpolate(t, times, f_of)) / Z_U for t, f in s.averaged(2. * h / C_U)
-                  if 2. * h / C_U < t < (20. - 2. * h) / C_U)
+                  if 2. * h / C_U < t < 17. / C_U)
     return run, v_error, f_error
 
 
