@@ -11,7 +11,7 @@ import sys
 from math import cos, hypot, log, pi, radians, sin, sqrt
 
 import scene_tools
-from scene_tools import TABLES, compare_tables, interpolate, least_squares, read_table
+from scene_tools import SCENES, TABLES, compare_tables, interpolate, least_squares, read_table, without
 
 G = 9.81
 # Of the saturated columns of I1 and I2.
@@ -192,7 +192,7 @@ def c3_block(c):
     run = c.run("C3_block", {"Constants/mu": 0.7, "References/way/Columns": "x_block(mu=0.7 v0=0) [m]"})
     s = run.table("statistics.csv")
     c.below("mu = 0.7: drift [h]", abs(s["center x"][-1] - s["center x"][0]) / 0.0625, 1e-3)
-    run = c.run("C3_block", {"Contacts/sliding/Law": "frictionless", "Constants/End": 0.5})
+    run = c.run("C3_block", {"Constants/mu": 0, "Constants/End": 0.5})
     c.below("no friction: acceleration", abs(acceleration(run)[0] / (G * sin(THETA)) - 1.), 5e-3)
 
 
@@ -466,6 +466,41 @@ def shifts(c):
     scatter(c, "bar on column", stresses)
 
 
+# -------------------------------------------------------------------------------------------------------- other laws
+def variant(c, scene, name, change):
+    """A scene whose text is changed: a path for c.run()."""
+    with open(os.path.join(SCENES, scene + ".prm")) as file:
+        text = change(without(file.read(), "References"))
+    path = os.path.join(c.root, name)
+    os.makedirs(c.root, exist_ok=True)
+    with open(path + ".prm", "w") as file:
+        file.write(text)
+    return path
+
+
+def laws(c):
+    # Tied bodies are one: the same as bodies between which no contact is named.
+    settings = {"Constants/Gap": 0.5}
+    tied = c.run(variant(c, "C1_bars_identical", "tied", lambda text: text.replace("Law    = frictionless", "Law = tied")),
+                 settings)
+    plain = c.run(variant(c, "C1_bars_identical", "plain", lambda text: without(text, "Contacts")), settings)
+    a, b = tied.table("statistics.csv"), plain.table("statistics.csv")
+    energy = max(b["kinetic energy"])
+    for column in ("kinetic energy", "elastic energy"):
+        c.below("tied against no contact: " + column,
+                max(abs(p - q) for p, q in zip(a[column], b[column])) / energy, 1e-12)
+
+    def block(name, law):
+        return c.run(variant(c, "C3_block", name, lambda text: text.replace("Law      = coulomb", law).replace(
+            "    set Friction = mu\n", "")), {"Constants/End": 0.5})
+
+    run = block("stick", "Law = stick")
+    s = run.table("statistics.csv")
+    c.below("stick: drift [h]", abs(s["center x"][-1] - s["center x"][0]) / 0.0625, 1e-3)
+    run = block("frictionless", "Law = frictionless")
+    c.below("frictionless: acceleration", abs(acceleration(run)[0] / (G * sin(THETA)) - 1.), 5e-3)
+
+
 # ---------------------------------------------------------------------------------------------------------- parallel
 def parallel(c):
     scenes = {"C1_bars_identical": {"Constants/Gap": 0.5},
@@ -521,6 +556,7 @@ CASES = {
     "I2_3d": (i2_3d, ("quick", "full"), 2),
     "I3_discs": (i3_discs, ("quick", "full"), 5),
     "I3_block": (i3_block, ("full",), 20),
+    "contact_laws": (laws, ("quick", "full"), 2),
     "contact_shifts": (shifts, ("full",), 5),
     "contact_parallel": (parallel, ("full",), 30),
     "contact_examples": (examples, ("full",), 180),

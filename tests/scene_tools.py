@@ -93,6 +93,24 @@ def read_vtu(path):
     return arrays
 
 
+def without(text, name):
+    """A parameter file without a subsection (of its top or within another)."""
+    lines, depth, skipped_from = [], 0, None
+    for line in text.splitlines():
+        words = line.split("#")[0].split()
+        if words[:1] == ["subsection"]:
+            depth += 1
+            if skipped_from is None and " ".join(words[1:]) == name:
+                skipped_from = depth
+        if skipped_from is None:
+            lines.append(line)
+        if words[:1] == ["end"]:
+            if skipped_from == depth:
+                skipped_from = None
+            depth -= 1
+    return "\n".join(lines) + "\n"
+
+
 class Context:
     """What a case works with: it runs scenes and notes what it finds."""
 
