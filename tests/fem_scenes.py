@@ -11,9 +11,11 @@ import os
 import subprocess
 import sys
 
-import scenes
-from scenes import TABLES, least_squares, read_table
 from math import atan2, cos, hypot, pi, sin
+
+import scene_tools
+from scene_tools import SCENES, TABLES, compare_tables, fit_decay, fitted_order, least_squares, read_table
+from scenes import d5_eigenvalues
 
 FEM = {"Method": "fem"}
 STEADY = {"Stages/consolidation/Solver": "quasi-static"}
@@ -37,7 +39,7 @@ def settled(c, scene, displacement, end, sizes=(10, 20, 40)):
         else:
             # Not 2 as it should be, but 1.4 to 1.7 (P2, q1: no order at all) at errors below 1e-4, and not because of the
             # steps; the stabilised pressures are the suspects. Open: to be asserted when understood.
-            c.report(name + ": pressure at the end, order (open)", "%.2f" % scenes.fitted_order(sizes, errors))
+            c.report(name + ": pressure at the end, order (open)", "%.2f" % fitted_order(sizes, errors))
 
 
 def p1(c):
@@ -123,12 +125,12 @@ def d3(c, sizes=(10, 20, 40)):
 
 
 def d5(c, sizes=(10, 20, 40)):
-    exact, errors = scenes.d5_eigenvalues("up"), []
+    exact, errors = d5_eigenvalues("up"), []
     for n in sizes:
         run = c.run("D5_standing_wave", dict(FEM, **{"Constants/cells": n, "Implicit solver/Start steps": 0,
                                                      "Implicit solver/Time step": 6e-4 / n}))
         p = run.table("probes.csv")
-        errors.append([abs(a / b - 1.) for a, b in zip(scenes.fit_decay(p["time"], p["middle/velocity y"], exact), exact)])
+        errors.append([abs(a / b - 1.) for a, b in zip(fit_decay(p["time"], p["middle/velocity y"], exact), exact)])
     c.below("imaginary part at 40 cells a wave length", errors[1][1], 2e-3)
     c.below("real part", errors[1][0], 2e-2)
     c.order("imaginary part", sizes, [e[1] for e in errors], 1.8)
@@ -139,7 +141,7 @@ def compared(c, scene, settings, fields, sizes=(10, 20)):
     found = []
     for n in sizes:
         directory = os.path.join(c.root, "compare_%d" % n)
-        command = [c.peat, "compare", os.path.join(scenes.SCENES, scene + ".prm"), "--quiet", "--output", directory]
+        command = [c.peat, "compare", os.path.join(SCENES, scene + ".prm"), "--quiet", "--output", directory]
         for key, value in dict(settings, **{"Constants/cells": n}).items():
             command += ["--set", "%s=%s" % (key, value)]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -227,9 +229,9 @@ def parallel_implicit(c):
                                                         "References/displacement of the top/Start": 0}),
         "P5_strip": dict(FEM, **{"Constants/cells": 2})}
     for scene, settings in cases.items():
-        runs = [c.run(scene, settings, ranks=n) for n in (1, 2, 3)]
-        for n, run in zip((2, 3), runs[1:]):
-            difference, column = scenes.compare_tables(runs[0].directory + "/probes.csv", run.directory + "/probes.csv")
+        runs = [c.run(scene, settings, ranks=n) for n in c.rank_counts]
+        for n, run in zip(c.rank_counts[1:], runs[1:]):
+            difference, column = compare_tables(runs[0].directory + "/probes.csv", run.directory + "/probes.csv")
             # Systems are solved to 1e-11.
             c.below("%s, %d ranks (%s)" % (scene, n, column), difference, 1e-7)
 
@@ -258,5 +260,4 @@ CASES = {
 }
 
 if __name__ == "__main__":
-    scenes.CASES = CASES
-    sys.exit(scenes.main())
+    sys.exit(scene_tools.main(CASES, __doc__))

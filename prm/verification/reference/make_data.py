@@ -14,8 +14,8 @@ import numpy as np
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.join(HERE, "exact"))
-import bar_wave, column_selfweight, geostatic, mandel, patch_rigid, stability, strip_box, terzaghi, two_layer, up_column
-import up_dispersion
+import bar_impact, bar_wave, column_selfweight, geostatic, hertz, incline, mandel, patch_rigid, porous_impact, stability
+import strip_box, terzaghi, two_layer, up_column, up_dispersion
 
 DATA = os.path.join(HERE, "data")
 UP = ("M", "K", "Q", "alpha", "rho", "rho_f")
@@ -272,11 +272,101 @@ def n1(p):
            "h^2)), D = Q K (1-r) with, Q K without the term rho_f u_tt in Darcy's law"])
 
 
+def bars(name, p):
+    o = bar_impact.solve(p["L1"], p["E1"], p["rho1"], p["L2"], p["E2"], p["rho2"], p["V1"], p["V2"], p["t_end"],
+                         nmin=p["ncell"])
+    assert o["T1err"] < 1e-9
+    stress, speed = bar_impact.contact(p["E1"], p["rho1"], p["E2"], p["rho2"], p["V1"], p["V2"])
+    write(name, p, ["t [s]", "contact stress [Pa]", "mean v1 [m/s]", "mean v2 [m/s]", "energy1 [J/m2]", "energy2 [J/m2]"],
+          np.c_[o["t"], o["F"], o["v1"], o["v2"], o["en1"], o["en2"]],
+          ["first contact stress %.10g Pa, velocity of the interface %.10g m/s, separation at %s s" % (
+              stress, speed, ", ".join("%.10g" % t for t in o["t_sep"])),
+           "final mean velocities %.10g, %.10g m/s" % (o["v1"][-1], o["v2"][-1]),
+           "t from the first contact on; values hold on [t, t + dt)"])
+
+
+def c3(p):
+    t, theta = np.linspace(0, p["t_end"], 101), np.radians(p["theta_deg"])
+    columns, data = ["t [s]"], [t]
+    for mu, v0 in p["mu_v0"]:
+        x, v, _ = incline.block(t, theta, mu, p["g"], v0)
+        columns += ["x_block(mu=%g v0=%g) [m]" % (mu, v0), "v_block(mu=%g v0=%g) [m/s]" % (mu, v0)]
+        data += [x, v]
+    for mu in p["mu_roller"]:
+        columns += ["x_cyl(mu=%g) [m]" % mu, "v_cyl(mu=%g) [m/s]" % mu, "omega_cyl(mu=%g) [rad/s]" % mu]
+        data += incline.roller(t, theta, mu, p["g"], p["R"])
+    write("C3_incline", p, columns, np.array(data).T)
+
+
+def c4(p):
+    t = np.linspace(0, p["t_end"], 51)
+    columns, data, notes = ["t [s]"], [t], []
+    for law in ("effective", "total"):
+        x, v, a, base = incline.saturated_slab(t, np.radians(p["theta_deg"]), p["mu"], p["rho"], p["rho_f"], p["alpha"],
+                                               p["g"], p["H"], law == "effective")
+        columns += ["x_%s [m]" % law, "v_%s [m/s]" % law]
+        data += [x, v]
+        notes.append("friction on %s stress: a = %.10g m/s2" % (law, a))
+    notes.append("base: p=%(p).8g Pa, sigma_n_eff=%(sn_eff).8g Pa, sigma_n_tot=%(sn_tot).8g Pa" % base)
+    write("C4_saturated_slab", p, columns, np.array(data).T, notes)
+
+
+def c5(p):
+    modulus = hertz.estar(p["E1"], p["nu1"], p["E2"] or np.inf, p["nu2"])
+    contacts = [hertz.line(P, p["R"], modulus) for P in p["P"]]
+    write("C5_hertz_line", p, ["P [N/m]", "b [m]", "p0 [Pa]", "tau_max [Pa]", "depth_tau_max [m]"],
+          [[P, c["b"], c["p0"], 0.30028 * c["p0"], 0.78615 * c["b"]] for P, c in zip(p["P"], contacts)],
+          ["E* = %.10g Pa" % modulus])
+
+
+def c6(p):
+    impact = hertz.impact(p["m"], p["R"], hertz.estar(p["E1"], p["nu1"], p["E2"] or np.inf, p["nu2"]), p["V"])
+    write("C6_hertz_sphere_impact", p, ["dmax [m]", "T [s]", "Fmax [N]"],
+          [[impact["dmax"], impact["T"], impact["Fmax"]]])
+
+
+def i1(p):
+    t = np.unique(np.r_[np.logspace(-7, np.log10(p["t_end"]), 60), np.linspace(p["t_end"] / 200, p["t_end"], 200)])
+    Z_b, c_b = np.sqrt(p["E_b"] * p["rho_b"]), np.sqrt(p["E_b"] / p["rho_b"])
+    for k in p["k"]:
+        S = soil(dict(p, k=k))
+        Z_u = np.sqrt(S["rho"] * (S["M"] + S["alpha"]**2 * S["Q"]))
+        plateau, back = p["v0"] * Z_b * Z_u / (Z_b + Z_u), min(2 * p["L_b"] / c_b, 2 * p["H"] / (Z_u / S["rho"]))
+        assert p["t_end"] < back
+        columns, data = ["t [s]", "F_undrained_K=0 [Pa]"], [t, np.full_like(t, plateau)]
+        for top, form in (("impermeable", "up"), ("drained", "up"), ("impermeable", "up0")):
+            columns.append("F_%s_%s [Pa]" % (form, top))
+            data.append(porous_impact.bar(t, p["v0"], p["E_b"], p["rho_b"], top=top, form=form, **sub(S, *UP)))
+        write("I1_bar_on_column_k=%g" % k, dict(p, k=k), columns, np.array(data).T,
+              derived(S) + ["Z_b=%.10g Z_u=%.10g Pa s/m; plateau %.10g Pa; first reflection returns at %.6g s" % (
+                  Z_b, Z_u, plateau, back)])
+
+
+def i2(p):
+    t = np.linspace(p["t_end"] / 300, p["t_end"], 300)
+    S = soil(dict(p, k=0.0))
+    Z_u = np.sqrt(S["rho"] * (S["M"] + S["alpha"]**2 * S["Q"]))
+    cases = [("K=0", porous_impact.rigid_undrained_finite(t, p["v0"], p["m"], Z_u, p["H"], Z_u / S["rho"]))]
+    for k in p["k"]:
+        cases.append(("k=%g" % k, porous_impact.rigid(t, p["v0"], p["m"], 60, H=p["H"],
+                                                      **sub(soil(dict(p, k=k)), *UP))))
+    columns, data, notes = ["t [s]"], [t], ["impermeable contact; Z_u=%.10g Pa s/m" % Z_u]
+    for name, (F, V) in cases:
+        lost = np.argmax(F < 0) if np.any(F < 0) else len(t)
+        columns += ["F(%s) [Pa]" % name, "V(%s) [m/s]" % name]
+        data += [np.where(np.arange(len(t)) < lost, y, np.nan) for y in (F, V)]
+        notes.append("%s: contact lost at about %.6g s (nan from then on)" % (name, t[min(lost, len(t) - 1)]))
+    write("I2_rigid_on_column", p, columns, np.array(data).T, notes)
+
+
 TABLES = {"S1_bar_mode": s1, "S2_bar_step": s2, "S3_gravity_step": s3, "S4_column_selfweight": s4,
           "S5_simple_shear": s5, "P1_terzaghi": p1, "P2_selfweight_consolidation": p2,
           "P3_two_layer": p3, "P4_mandel": p4, "P5_strip_consolidation": p5, "D1_harmonic": d1,
           "D2_step": lambda p: column("D2_step", p), "D3_ramp": lambda p: column("D3_ramp", p), "D5_standing": d5,
-          "D6_strip_dynamic": d6, "G1_geostatic": g1, "N1_timestep": n1}
+          "D6_strip_dynamic": d6, "G1_geostatic": g1, "N1_timestep": n1,
+          "C1_bars_identical": lambda p: bars("C1_bars_identical", p),
+          "C2_bars_unequal": lambda p: bars("C2_bars_unequal", p), "C3_incline": c3, "C4_saturated_slab": c4,
+          "C5_hertz_line": c5, "C6_hertz_sphere_impact": c6, "I1_bar_on_column": i1, "I2_rigid_on_column": i2}
 
 if __name__ == "__main__":
     with open(os.path.join(DATA, "params.json")) as file:
