@@ -10,6 +10,10 @@ namespace {
 /// of it.
 constexpr double margin = 2.;
 constexpr double renewal = 0.5;
+/// A node feels the rigid body if it is not farther from its surface than this [cell sizes]: then of the two
+/// rows of nodes beside a surface the nearer one does, and of material below it only what belongs to that row
+/// moves along.
+constexpr double influence = 0.5 + 1e-9;
 /// Points that are less than this farther than the nearest one have a say in a node's normal [cell sizes].
 constexpr double normal_range = 0.25;
 constexpr double far = std::numeric_limits<double>::max();
@@ -145,7 +149,9 @@ void RigidContact<dim>::find_gaps()
     nodes.sum_over_ranks(sums.data(), n_columns);
   for (ContactSite<dim> &site : sites) {
     const double *sum = &sums[std::size_t(site.second) * n_columns];
-    site.gap = sum[0] > 0. ? -nearest[site.second] : far;
+    const bool feels =
+        sum[0] > 0. && rigid.distance(nodes.position(site.second)) <= influence * grid.smallest_cell_size();
+    site.gap = feels ? -nearest[site.second] : far;
     Vector gradient;
     for (unsigned int d = 0; d < dim; ++d) {
       site.normal[d] = sum[1 + d];
