@@ -120,10 +120,10 @@ void RigidBodyParameters<dim>::read_free()
   if (section.describing())
     return;
 
-  if (section.has("Density") == section.has("Mass"))
-    section.fail(section.has("Mass") ? "Mass" : "", "free rigid body '" + name + "' needs " +
-                                                        (section.has("Mass") ? "only one of" : "one of") +
-                                                        " 'Density' and 'Mass'");
+  if (!section.has("Mass"))
+    section.require("Density", "without a 'Mass' free rigid body '" + name + "'");
+  if (section.has("Mass") && section.has("Density"))
+    section.fail("Mass", "rigid body '" + name + "' has a 'Density' already; give only one of the two");
   if (section.has("Moment of inertia") && !section.has("Mass"))
     section.fail("Moment of inertia", "belongs to 'Mass'; with 'Density' it follows from the shape");
   if (std::any_of(inertia.begin(), inertia.end(), [](const double I) { return I != 0.; }))
