@@ -26,7 +26,7 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-GOOD = ("good.prm", "dry.prm", "solid.prm")
+GOOD = ("good.prm", "dry.prm", "solid.prm", "rigid.prm")
 SECONDS = 5.0
 LONGEST_LINE = 700
 

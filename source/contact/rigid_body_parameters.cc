@@ -117,14 +117,15 @@ void RigidBodyParameters<dim>::read_free()
   inertia = as_array < dim == 2 ? 1 : 6 > (moments);
   initial_velocity = as_array<dim>(velocity_values);
   initial_spin = as_array<n_rotations>(spin_values);
+  const bool has_inertia = section.has("Moment of inertia");
   if (section.describing())
     return;
 
-  if (section.has("Density") == section.has("Mass"))
-    section.fail(section.has("Mass") ? "Mass" : "", "free rigid body '" + name + "' needs " +
-                                                        (section.has("Mass") ? "only one of" : "one of") +
-                                                        " 'Density' and 'Mass'");
-  if (section.has("Moment of inertia") && !section.has("Mass"))
+  if (!section.has("Mass"))
+    section.require("Density", "without a 'Mass' free rigid body '" + name + "'");
+  if (section.has("Mass") && section.has("Density"))
+    section.fail("Mass", "rigid body '" + name + "' has a 'Density' already; give only one of the two");
+  if (has_inertia && !section.has("Mass"))
     section.fail("Moment of inertia", "belongs to 'Mass'; with 'Density' it follows from the shape");
   if (std::any_of(inertia.begin(), inertia.end(), [](const double I) { return I != 0.; }))
     check_inertia(section, inertia);

@@ -424,8 +424,8 @@ BOOST_AUTO_TEST_CASE(wrong_sections_are_refused)
   BOOST_TEST(refusal<2>(plane + "set Density = 1") == "");
   BOOST_TEST(refusal<2>(plane + "set Motion = prescribed") == "");
   check_refused<2>("set Density = 1", {"'sand' needs a 'Shape'"});
-  check_refused<2>(plane, {"one of 'Density' and 'Mass'"});
-  check_refused<2>(plane + "set Density = 1\nset Mass = 1", {":4:", "only one of 'Density' and 'Mass'"});
+  check_refused<2>(plane, {"without a 'Mass'", "needs a 'Density'"});
+  check_refused<2>(plane + "set Density = 1\nset Mass = 1", {":4:", "only one of the two"});
   check_refused<2>(plane + "set Density = 0", {"must be > 0"});
   check_refused<2>(plane + "set Density = 1\nset Moment of inertia = 1", {"belongs to 'Mass'"});
   check_refused<2>(plane + "set Mass = 1\nset Moment of inertia = -1", {">= 0"});

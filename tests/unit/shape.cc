@@ -3,6 +3,7 @@
 
 #include <peat/grid/cut_box.h>
 #include <peat/grid/shape.h>
+#include <peat/grid/surface_mesh.h>
 
 #include <algorithm>
 #include <cmath>
@@ -428,4 +429,41 @@ BOOST_AUTO_TEST_CASE(small_and_thin_things_are_not_lost)
   const auto box = cut(*frame, P(-.5, -.5), P(1.5, 1.5));
   BOOST_TEST(box.volume == .36, boost::test_tools::tolerance(1e-14));
   BOOST_TEST(frame->distance(box.centroid) <= 0.);
+}
+
+namespace {
+/// Length or area of a shape's surface as it is shown.
+template <int dim>
+double shown_area(const std::string &text)
+{
+  const auto s = shape<dim>(text);
+  const SurfaceMesh<dim> mesh = surface_mesh(*s);
+  double area = 0., farthest = 0.;
+  for (const auto &facet : mesh.facets) {
+    const auto &a = mesh.vertices[facet[0]], &b = mesh.vertices[facet[1]], &c = mesh.vertices[facet[dim - 1]];
+    area += dim == 2 ? (b - a).norm()
+                     : 0.5 * std::sqrt((b - a).norm_square() * (c - a).norm_square() -
+                                       ((b - a) * (c - a)) * ((b - a) * (c - a)));
+  }
+  for (const auto &x : mesh.vertices)
+    farthest = std::max(farthest, std::abs(s->distance(x)));
+  BOOST_TEST_INFO(text);
+  BOOST_TEST(farthest <= 0.5 * s->bounds().radius() * 2. / (dim == 2 ? 128. : 40.));
+  return area;
+}
+} // namespace
+
+BOOST_AUTO_TEST_CASE(surfaces_to_look_at)
+{
+  // Cut-off edges make surfaces smaller, by less than a cell's width beside each.
+  BOOST_TEST(shown_area<2>("ball(1, 2, 3)") == 6. * pi, boost::test_tools::tolerance(1e-3));
+  BOOST_TEST(shown_area<2>("box(0, 0, 2, 1)") == 6., boost::test_tools::tolerance(0.01));
+  // The sides of the notch lie on lines of the grid.
+  BOOST_TEST(shown_area<2>("difference(box(0, 0, 4, 4), box(1, 2, 3, 5))") == 20.,
+             boost::test_tools::tolerance(0.01));
+  BOOST_TEST(shown_area<3>("ball(1, 2, 3, 4)") == 64. * pi, boost::test_tools::tolerance(5e-3));
+  BOOST_TEST(shown_area<3>("box(0, 0, 0, 1, 2, 3)") == 22., boost::test_tools::tolerance(0.03));
+  BOOST_TEST(shown_area<3>("cylinder(0, 0, 0, 0, 0, 2, 1)") == 6. * pi, boost::test_tools::tolerance(0.03));
+  BOOST_TEST(shown_area<3>("difference(box(0, 0, 0, 4, 4, 4), box(1, 1, 2, 3, 3, 5))") == 96. + 16.,
+             boost::test_tools::tolerance(0.03));
 }
