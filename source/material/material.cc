@@ -22,12 +22,25 @@ Material::Material(Section section) : given_name(section.name())
                      "belongs to saturated materials; set 'Porosity' to make '" + given_name + "' one");
   }
 }
-double Material::initial_modulus() const
+
+namespace {
+std::vector<Lanes> initial_state(const Law &law)
 {
   std::vector<Lanes> state;
-  for (const StateField &field : skeleton->state())
+  for (const StateField &field : law.state())
     for (const double value : field.initial)
       state.push_back(broadcast(value));
-  return skeleton->wave_modulus({}, state.data())[0];
+  return state;
+}
+} // namespace
+
+double Material::initial_modulus() const
+{
+  return skeleton->wave_modulus({}, initial_state(*skeleton).data())[0];
+}
+
+void Material::initial_tangent(std::array<Lanes, 36> &tangent) const
+{
+  skeleton->tangent({}, initial_state(*skeleton).data(), tangent);
 }
 } // namespace peat

@@ -1,15 +1,13 @@
 #pragma once
 
 #include <peat/material/mixture.h>
+#include <peat/material/tensor.h>
 #include <peat/points/body.h>
 #include <peat/solver/space.h>
 #include <peat/solver/up_form.h>
 #include <peat/transfer/weights.h>
 
-#include <Eigen/Core>
-
-// What the weak form needs of the points of a cell: shape functions at eight of them, and the products of
-// shape functions of all of them that make the cell's matrix.
+// What the weak form needs of the points of a cell: their data and the shape functions at eight of them.
 
 namespace peat {
 /// Up to eight points of a cell: their data and the shape functions at them. Lanes without a point have no
@@ -20,7 +18,6 @@ class FormPoints
 public:
   static constexpr unsigned int n_nodes = dim == 2 ? reach * reach : reach * reach * reach;
   static constexpr unsigned int n_pressures = Space<dim>::n_pressures;
-  static constexpr unsigned int stress_index[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
   static constexpr unsigned int n_stress = dim == 2 ? 4 : 6;
 
   FormPoints(const Grid<dim> &grid, const Body<dim> &body, const Slice &slice, const std::uint32_t begin);
@@ -99,7 +96,11 @@ public:
     return result;
   }
 
-  /// Porosity, and with `move` position, volume and extent, follow the displacement gradient of a step.
+  /// Refer slopes and volumes to a configuration that has moved on by F: grad N <- F^-T grad N, V <- det F V.
+  void push_forward(const GradientLanes &inverse_of_F, Lanes det_F);
+
+  /// Positions follow the displacement U of a step if they `move`; under finite strain porosities, volumes
+  /// and, with `move`, extents follow its gradient.
   void deform(Body<dim> &body, const GradientLanes &gradient, const double *U, bool move) const;
 
 private:
@@ -153,187 +154,42 @@ FormPoints<dim, reach>::FormPoints(const Grid<dim> &grid, const Body<dim> &body,
 }
 
 template <int dim, unsigned int reach>
+void FormPoints<dim, reach>::push_forward(const GradientLanes &inverse_of_F, const Lanes det_F)
+{
+  const auto push = [&](std::array<Lanes, dim> &slope) {
+    std::array<Lanes, dim> result;
+    for (unsigned int d = 0; d < dim; ++d) {
+      result[d] = inverse_of_F[d] * slope[0];
+      for (unsigned int e = 1; e < dim; ++e)
+        result[d] += inverse_of_F[3 * e + d] * slope[e];
+    }
+    slope = result;
+  };
+  for (auto &slope : dN)
+    push(slope);
+  for (auto &slope : dM)
+    push(slope);
+  volume *= det_F;
+}
+
+template <int dim, unsigned int reach>
 void FormPoints<dim, reach>::deform(Body<dim> &body, const GradientLanes &h, const double *U,
                                     const bool move) const
 {
   const Layout &layout = body.layout();
-  if (!body.material().law().finite_strain() && !move)
-    return;
-  Lanes J = 1. + h[0] + h[4] + h[8];
-  if (layout.porosity >= 0)
-    store(layout.porosity, 1. - (1. - load(layout.porosity)) / J);
-  if (!move)
-    return;
-  for (unsigned int d = 0; d < dim; ++d) {
-    const Lanes step = value(U, d);
-    for (unsigned int l = 0; l < n; ++l)
-      body.position(handle[l])[d] += step[l];
-  }
+  if (move)
+    for (unsigned int d = 0; d < dim; ++d) {
+      const Lanes step = value(U, d);
+      for (unsigned int l = 0; l < n; ++l)
+        body.position(handle[l])[d] += step[l];
+    }
   if (!body.material().law().finite_strain())
     return;
+  const Lanes J = 1. + volume_change(h);
+  if (layout.porosity >= 0)
+    store(layout.porosity, 1. - (1. - load(layout.porosity)) / J);
   store(layout.volume, load(layout.volume) * J);
-  for (unsigned int d = 0; d < dim && layout.extent >= 0; ++d)
+  for (unsigned int d = 0; d < dim && move && layout.extent >= 0; ++d)
     store(layout.extent + d, load(layout.extent + d) * (1. + h[4 * d]));
-}
-
-/// The shape functions of all points of a cell as tall matrices, whose products make the cell's matrix.
-template <int dim, unsigned int reach>
-class StackedPoints
-{
-public:
-  using Points = FormPoints<dim, reach>;
-  static constexpr unsigned int n_nodes = Points::n_nodes, n_u = n_nodes * dim, n_p = Space<dim>::n_pressures;
-  static constexpr unsigned int n_strain = dim == 2 ? 3 : 6;
-
-  struct Coefficients
-  {
-    double alpha, fluid_density;
-    Lanes storage, mobility;
-  };
-
-  /// Make room for a cell with so many points.
-  void clear(const unsigned int n_points)
-  {
-    rows = 0;
-    largest_compliance = 0.;
-    if (B.rows() < n_points * n_strain) {
-      B.setZero(n_points * n_strain, n_u);
-      DB.setZero(n_points * n_strain, n_u);
-      N.resize(n_points, n_nodes);
-      mN.resize(n_points, n_nodes);
-      divergence.resize(n_points, n_u);
-      M.resize(n_points, n_p);
-      storage.resize(n_points, n_p);
-      coupling.resize(n_points, n_p);
-      drained.resize(n_points, n_p);
-      dM.resize(n_points * dim, n_p);
-      mobility.resize(n_points * dim, n_p);
-      drag.resize(n_points * dim, n_p);
-    }
-  }
-  void add(const Points &points, const std::array<Lanes, 36> &tangent, const Coefficients &c,
-           bool has_pressure);
-  /// The cell's matrix: minus the derivative of the residual.
-  void multiply(const TimeLevel &level, bool has_pressure, dealii::FullMatrix<double> &result);
-  /// sum V alpha^2 / K N_p N_p with the drained bulk modulus K.
-  Eigen::Matrix<double, n_p, n_p> pressure_mass() const
-  {
-    return M.topRows(rows).transpose() * drained.topRows(rows);
-  }
-  /// Compliance for the stabilisation [1/Pa]: the larger of 1/M (one-dimensional optimum) and 1/(4 G).
-  double compliance() const { return largest_compliance; }
-
-private:
-  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  unsigned int rows = 0; ///< points so far
-  double largest_compliance = 0.;
-  Matrix B, DB, N, mN, divergence, M, storage, coupling, drained, dM, mobility, drag;
-  Matrix K, mass, Qc, S, H, G;
-};
-
-template <int dim, unsigned int reach>
-void StackedPoints<dim, reach>::add(const Points &points, const std::array<Lanes, 36> &tangent,
-                                    const Coefficients &c, const bool has_pressure)
-{
-  constexpr unsigned int component[6] = {0, 1, dim == 2 ? 3u : 2u, 3, 4, 5};
-  constexpr unsigned int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
-  for (unsigned int l = 0; l < points.n; ++l, ++rows) {
-    const double V = points.volume[l];
-    largest_compliance =
-        std::max({largest_compliance, 1. / tangent[0][l], tangent[21][l] > 0. ? 0.25 / tangent[21][l] : 0.});
-    // Bulk modulus lambda + 2 mu / dim.
-    const double bulk = (tangent[0][l] + (dim - 1) * tangent[1][l]) / dim;
-    Eigen::Matrix<double, n_strain, n_strain> D;
-    for (unsigned int a = 0; a < n_strain; ++a)
-      for (unsigned int b = 0; b < n_strain; ++b)
-        D(a, b) = V * tangent[6 * component[a] + component[b]][l];
-    auto block = B.middleRows(rows * n_strain, n_strain);
-    for (unsigned int i = 0; i < n_nodes; ++i) {
-      N(rows, i) = points.N[i][l];
-      mN(rows, i) = points.mass[l] * points.N[i][l];
-      for (unsigned int a = 0; a < n_strain; ++a) {
-        const auto &pair = pairs[component[a]];
-        if (pair[0] == pair[1])
-          block(a, i * dim + pair[0]) = points.dN[i][pair[0]][l];
-        else {
-          block(a, i * dim + pair[0]) = points.dN[i][pair[1]][l];
-          block(a, i * dim + pair[1]) = points.dN[i][pair[0]][l];
-        }
-      }
-      for (unsigned int d = 0; d < dim; ++d)
-        divergence(rows, i * dim + d) = points.dN[i][d][l];
-    }
-    DB.middleRows(rows * n_strain, n_strain).noalias() = D * block;
-    if (!has_pressure)
-      continue;
-    for (unsigned int i = 0; i < n_p; ++i) {
-      M(rows, i) = points.M[i][l];
-      storage(rows, i) = V * c.storage[l] * points.M[i][l];
-      coupling(rows, i) = V * c.alpha * points.M[i][l];
-      drained(rows, i) = V * c.alpha * c.alpha / bulk * points.M[i][l];
-      for (unsigned int d = 0; d < dim; ++d) {
-        const double slope = points.dM[i][d][l];
-        dM(d * M.rows() + rows, i) = slope;
-        mobility(d * M.rows() + rows, i) = V * c.mobility[l] * slope;
-        drag(d * M.rows() + rows, i) = V * c.mobility[l] * c.fluid_density * slope;
-      }
-    }
-  }
-}
-
-template <int dim, unsigned int reach>
-void StackedPoints<dim, reach>::multiply(const TimeLevel &level, const bool has_pressure,
-                                         dealii::FullMatrix<double> &result)
-{
-  K.noalias() = level.share * B.topRows(rows * n_strain).transpose() * DB.topRows(rows * n_strain);
-  result = 0.;
-  for (unsigned int i = 0; i < n_u; ++i)
-    for (unsigned int j = 0; j < n_u; ++j)
-      result(i, j) = K(i, j);
-  if (level.acceleration > 0.) {
-    mass.noalias() = level.acceleration * N.topRows(rows).transpose() * mN.topRows(rows);
-    for (unsigned int i = 0; i < n_nodes; ++i)
-      for (unsigned int j = 0; j < n_nodes; ++j)
-        for (unsigned int d = 0; d < dim; ++d)
-          result(i * dim + d, j * dim + d) += mass(i, j);
-  }
-  if (!has_pressure)
-    return;
-
-  const double scale = level.fluid_scale();
-  Qc.noalias() = divergence.topRows(rows).transpose() * coupling.topRows(rows);
-  S.noalias() = M.topRows(rows).transpose() * storage.topRows(rows);
-  H.setZero(n_p, n_p);
-  for (unsigned int d = 0; d < dim; ++d)
-    H.noalias() += dM.middleRows(d * M.rows(), rows).transpose() * mobility.middleRows(d * M.rows(), rows);
-  for (unsigned int j = 0; j < n_p; ++j) {
-    for (unsigned int i = 0; i < n_u; ++i) {
-      result(i, n_u + j) = -level.share * Qc(i, j);
-      result(n_u + j, i) = scale * level.velocity * Qc(i, j);
-    }
-    for (unsigned int i = 0; i < n_p; ++i)
-      result(n_u + i, n_u + j) = scale * (level.pressure_rate * S(i, j) + level.share * H(i, j));
-  }
-  if (!level.seepage_inertia || level.acceleration == 0.)
-    return;
-  for (unsigned int d = 0; d < dim; ++d) {
-    G.noalias() = drag.middleRows(d * M.rows(), rows).transpose() * N.topRows(rows);
-    for (unsigned int i = 0; i < n_p; ++i)
-      for (unsigned int j = 0; j < n_nodes; ++j)
-        result(n_u + i, j * dim + d) += scale * level.acceleration * G(i, j);
-  }
-}
-
-/// Mean over the points of a cell by their volumes.
-template <int dim>
-double mean_pressure(const Body<dim> &body, const Slice &slice)
-{
-  double V = 0., Vp = 0.;
-  for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
-    const double *row = body.row(body.handles()[i]);
-    V += row[body.layout().volume];
-    Vp += row[body.layout().volume] * row[body.layout().pressure];
-  }
-  return Vp / V;
 }
 } // namespace peat

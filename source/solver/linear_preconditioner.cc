@@ -243,7 +243,7 @@ void BlockPreconditioner::build(const BlockMatrix &new_matrix, const Preconditio
     volumetric.build(data);
   if (matrix->n_block_rows() == 2)
     schur.build(*matrix, data);
-  if (data.shear && matrix->n_block_rows() == 2) {
+  if (data.projection) {
     p_scratch.reinit(matrix->block(1, 1).locally_owned_range_indices(), matrix->get_mpi_communicator());
     psi_scratch = projected = *data.volumetric_compliance;
   }
@@ -253,21 +253,25 @@ void BlockPreconditioner::build(const BlockMatrix &new_matrix, const Preconditio
 void BlockPreconditioner::vmult(BlockVector &result, const BlockVector &source) const
 {
   const bool has_pressure = matrix->n_block_rows() == 2, mixed = data.shear != nullptr;
+  const unsigned int last = result.n_blocks() - 1;
   u_scratch = source.block(0);
-  if (mixed && has_pressure)
+  if (data.projection)
     solve_pressures(result, source);
-  else if (has_pressure) {
-    schur.vmult(result.block(1), source.block(1));
-    result.block(1) *= -1.;
-  } else if (mixed) {
-    volumetric.vmult(result.block(1), source.block(1));
-    result.block(1) *= -1.;
+  else {
+    if (has_pressure) {
+      schur.vmult(result.block(1), source.block(1));
+      result.block(1) *= -1.;
+    }
+    if (mixed) {
+      volumetric.vmult(result.block(last), source.block(last));
+      result.block(last) *= -1.;
+    }
   }
   // u = A^-1 (f_u - B p - G pi)
   if (has_pressure)
     subtract(u_scratch, matrix->block(0, 1), result.block(1));
   if (mixed)
-    subtract(u_scratch, *data.gradient, result.block(result.n_blocks() - 1));
+    subtract(u_scratch, *data.gradient, result.block(last));
   displacement.vmult(result.block(0), u_scratch);
 }
 

@@ -68,11 +68,11 @@ void LinearSolver::reinit(DisplacementUnknowns new_unknowns)
   is_fresh = is_worn = false;
 }
 
-bool LinearSolver::choose_direct() const
+bool LinearSolver::would_be_direct(const dealii::types::global_dof_index n_unknowns) const
 {
   if (parameters.method != LinearSolverParameters::Method::automatic)
     return parameters.method == LinearSolverParameters::Method::direct;
-  return matrix->m() <= (unknowns.dim == 2 ? parameters.direct_limit_2d : parameters.direct_limit_3d);
+  return n_unknowns <= (unknowns.dim == 2 ? parameters.direct_limit_2d : parameters.direct_limit_3d);
 }
 
 void LinearSolver::prepare(const BlockMatrix &new_matrix, const PreconditionerData &new_data,
@@ -81,7 +81,7 @@ void LinearSolver::prepare(const BlockMatrix &new_matrix, const PreconditionerDa
   matrix = &new_matrix;
   data = new_data;
   if (!preconditioner || reuse == Reuse::nothing) {
-    direct = choose_direct();
+    direct = would_be_direct(matrix->m());
     if (direct)
       preconditioner = std::make_unique<DirectFactor>(purpose);
     else

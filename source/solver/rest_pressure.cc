@@ -4,7 +4,7 @@
 
 #include <sstream>
 
-#include "form_points.h"
+#include "form_cell.h"
 
 namespace peat {
 namespace {

@@ -2,19 +2,10 @@
 
 #include <peat/material/mixture.h>
 
-#include "form_points.h"
+#include "form_matrices.h"
 
 namespace peat {
 namespace {
-/// Gathers the entries of a vector at a cell's unknowns.
-void gather(const BlockVector &vector, const dealii::types::global_dof_index *unknowns, const unsigned int n,
-            const dealii::types::global_dof_index offset, const unsigned int block, double *result)
-{
-  const auto &part = vector.block(block);
-  for (unsigned int i = 0; i < n; ++i)
-    result[i] = part(unknowns[i] - offset);
-}
-
 Lanes sum_of_squares(const StressLanes &s)
 {
   return s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + s[3] * s[3] + s[4] * s[4] + s[5] * s[5];
@@ -24,13 +15,11 @@ template <int dim, unsigned int reach>
 class PointForm : public UpForm<dim>
 {
 public:
-  explicit PointForm(const Space<dim> &space) : space(space) {}
+  PointForm(const Space<dim> &space, const bool projects) : space(space), cell(space, projects) {}
 
+  unsigned int n_volumetric() const override { return cell.projection() ? Matrices::n_psi : 0; }
   void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
-                const VolumeLoads<dim> &loads, double stabilisation,
-                const dealii::AffineConstraints<double> &constraints, BlockVector &residual,
-                BlockMatrix *matrix, dealii::TrilinosWrappers::SparseMatrix *pressure_mass,
-                GrossResidual &gross) override;
+                const VolumeLoads<dim> &loads, double stabilisation, const UpSystem &system) override;
   void update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
                      const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity, bool move,
                      StepWork &work) override;
@@ -42,104 +31,40 @@ public:
 
 private:
   using Points = FormPoints<dim, reach>;
+  using Cell = FormCell<dim, reach>;
+  using PointValues = typename Cell::State;
+  using Matrices = CellMatrices<dim, reach>;
   static constexpr unsigned int n_u = Points::n_nodes * dim, n_p = Space<dim>::n_pressures;
 
-  /// The nodal values of a cell.
-  struct CellValues
-  {
-    double U[n_u], v_history[n_u], a_history[n_u], end_velocity[n_u];
-    double P[n_p], rate_history[n_p], old_P[n_p];
-    bool has_pressure;
-  };
-  void load(const CellId cell, const bool saturated, const TimeLevel &level, const StepState &state,
-            CellValues &values) const;
-  /// Stress, pressure and rates of eight points at the level's time.
-  struct PointValues
-  {
-    GradientLanes gradient; ///< of U
-    StressLanes stress;
-    std::array<Lanes, max_state_columns> memory;
-    std::array<Lanes, dim> acceleration, pressure_gradient;
-    Lanes velocity_divergence, old_pressure, pressure, pressure_rate;
-  };
-  void evaluate(const Body<dim> &body, const Points &points, const TimeLevel &level, const CellValues &values,
-                double mean_pressure, PointValues &at) const;
   void add_residual(const Body<dim> &body, const Points &points, const TimeLevel &level,
                     const PointValues &at, const VolumeLoads<dim> &loads, bool has_pressure,
                     GrossResidual &gross);
-  void add_matrices(const Body<dim> &body, const Points &points, const PointValues &at, bool has_pressure);
-  void add_pressure_mass(const TimeLevel &level, const dealii::AffineConstraints<double> &constraints,
-                         dealii::TrilinosWrappers::SparseMatrix &matrix);
+  void add_fluid_residual(const Body<dim> &body, const Points &points, const TimeLevel &level,
+                          const PointValues &at, const VolumeLoads<dim> &loads, GrossResidual &gross);
+  Lanes fluid_storage_rate(const Body<dim> &body, const Points &points, const TimeLevel &level,
+                           const PointValues &at, const VolumeLoads<dim> &loads) const;
+  void add_matrices(const Body<dim> &body, std::size_t batch, const TimeLevel &level,
+                    const VolumeLoads<dim> &loads, bool has_pressure);
+  void book_seepage(const Body<dim> &body, const Points &points, const TimeLevel &level,
+                    const PointValues &at, const dealii::Tensor<1, dim> &gravity, StepWork &work) const;
+  void distribute(const TimeLevel &level, bool has_pressure, const UpSystem &system);
+  void add_pressure_mass(const TimeLevel &level, const UpSystem &system);
+  void add_split(const TimeLevel &level, bool has_pressure, const UpSystem &system);
   template <typename Term>
   void sum_over_nodes(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &sums, const Term &term);
-  void stabilise(const Body<dim> &body, const Slice &slice, const TimeLevel &level, const CellValues &values,
-                 double strength, bool with_matrix);
+  void stabilise(const Body<dim> &body, const Slice &slice, const TimeLevel &level, double strength,
+                 bool with_matrix);
+  /// For the stabilisation [1/Pa]: the larger of 1/M (one-dimensional optimum) and 1/(4 G) at the start of
+  /// the step.
+  double compliance(const Body<dim> &body) const;
 
   const Space<dim> &space;
+  Cell cell;
   std::vector<dealii::types::global_dof_index> unknowns;
   dealii::Vector<double> local_residual;
   dealii::FullMatrix<double> local_matrix;
-  StackedPoints<dim, reach> stacked;
+  Matrices matrices;
 };
-
-template <int dim, unsigned int reach>
-void PointForm<dim, reach>::load(const CellId cell, const bool saturated, const TimeLevel &level,
-                                 const StepState &state, CellValues &values) const
-{
-  const auto *u = space.displacements(cell);
-  gather(state.unknown, u, n_u, 0, 0, values.U);
-  std::fill_n(values.v_history, n_u, 0.);
-  std::fill_n(values.a_history, n_u, 0.);
-  gather(state.rate_history, u, n_u, 0, 0, values.v_history);
-  if (level.acceleration > 0.)
-    gather(state.second_history, u, n_u, 0, 0, values.a_history);
-  values.has_pressure = saturated && space.has_pressure();
-  if (!values.has_pressure)
-    return;
-  const auto *p = space.pressures(cell);
-  gather(state.unknown, p, n_p, space.first_pressure(), 1, values.P);
-  gather(state.rate_history, p, n_p, space.first_pressure(), 1, values.rate_history);
-  gather(state.second_history, p, n_p, space.first_pressure(), 1, values.old_P);
-}
-
-template <int dim, unsigned int reach>
-void PointForm<dim, reach>::evaluate(const Body<dim> &body, const Points &points, const TimeLevel &level,
-                                     const CellValues &values, const double mean_pressure,
-                                     PointValues &at) const
-{
-  const Layout &layout = body.layout();
-  at.gradient = points.gradient(values.U);
-  GradientLanes part;
-  for (unsigned int c = 0; c < 9; ++c)
-    part[c] = level.share * at.gradient[c];
-  at.stress = points.stress(layout);
-  for (unsigned int c = 0; c < layout.n_state; ++c)
-    at.memory[c] = points.load(layout.state + c);
-  body.material().law().update(part, at.stress, at.memory.data());
-
-  at.velocity_divergence = level.velocity * (at.gradient[0] + at.gradient[4] + at.gradient[8]);
-  const GradientLanes history = points.gradient(values.v_history);
-  at.velocity_divergence += history[0] + history[4] + history[8];
-  for (unsigned int d = 0; d < dim; ++d)
-    at.acceleration[d] = level.acceleration * points.value(values.U, d) + points.value(values.a_history, d);
-
-  at.old_pressure = layout.pressure >= 0 ? points.load(layout.pressure) : Lanes{};
-  at.pressure = broadcast(mean_pressure);
-  at.pressure_rate = Lanes{};
-  at.pressure_gradient.fill(Lanes{});
-  if (!values.has_pressure)
-    return;
-  const Lanes P = points.pressure(values.P);
-  at.pressure = level.share * P + (1. - level.share) * at.old_pressure;
-  at.pressure_rate = level.pressure_rate * (P - at.old_pressure);
-  if (level.pressure_rate > 0.)
-    at.pressure_rate += points.pressure(values.rate_history);
-  for (unsigned int d = 0; d < dim; ++d) {
-    at.pressure_gradient[d] = level.share * points.pressure_slope(values.P, d);
-    if (level.share < 1.)
-      at.pressure_gradient[d] += (1. - level.share) * points.pressure_slope(values.old_P, d);
-  }
-}
 
 template <int dim, unsigned int reach>
 void PointForm<dim, reach>::add_residual(const Body<dim> &body, const Points &points, const TimeLevel &level,
@@ -168,29 +93,45 @@ void PointForm<dim, reach>::add_residual(const Body<dim> &body, const Points &po
     for (unsigned int d = 0; d < dim; ++d) {
       Lanes r = points.N[i] * force[d];
       for (unsigned int e = 0; e < dim; ++e)
-        r -= V * total[Points::stress_index[d][e]] * points.dN[i][e];
+        r -= V * total[symmetric_index[d][e]] * points.dN[i][e];
       local_residual[i * dim + d] += sum(r);
     }
-  if (!has_pressure)
-    return;
+  if (has_pressure)
+    add_fluid_residual(body, points, level, at, loads, gross);
+}
 
-  const double scale = level.fluid_scale(), inertia = level.seepage_inertia ? 1. : 0.;
-  const Lanes porosity = points.porosity(body.layout(), *mixture);
-  Lanes storage =
-      mixture->storage(porosity) * at.pressure_rate + mixture->biot_coefficient() * at.velocity_divergence;
+template <int dim, unsigned int reach>
+Lanes PointForm<dim, reach>::fluid_storage_rate(const Body<dim> &body, const Points &points,
+                                                const TimeLevel &level, const PointValues &at,
+                                                const VolumeLoads<dim> &loads) const
+{
+  const Mixture &mixture = *body.material().mixture();
+  Lanes rate =
+      mixture.storage(at.porosity) * at.pressure_rate + mixture.biot_coefficient() * at.velocity_divergence;
   for (const Condition<dim> *condition : loads.fluids)
     for (unsigned int l = 0; l < points.n; ++l)
-      storage[l] -= condition->fluid_source(points.position(body, l), level.time);
-  const Lanes mobility = V * mixture->mobility(porosity);
+      rate[l] -= condition->fluid_source(points.position(body, l), level.time);
+  return rate;
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::add_fluid_residual(const Body<dim> &body, const Points &points,
+                                               const TimeLevel &level, const PointValues &at,
+                                               const VolumeLoads<dim> &loads, GrossResidual &gross)
+{
+  const Mixture &mixture = *body.material().mixture();
+  const double scale = level.fluid_scale(), inertia = level.seepage_inertia ? 1. : 0.;
+  const Lanes V = points.volume, storage = fluid_storage_rate(body, points, level, at, loads);
+  const Lanes mobility = V * mixture.mobility(at.porosity);
   Lanes slope = {};
   for (unsigned int d = 0; d < dim; ++d)
     slope += at.pressure_gradient[d] * at.pressure_gradient[d];
   gross[1] += std::abs(scale) *
               sum(mobility * sqrt(slope) / space.grid().smallest_cell_size() +
-                  V * level.pressure_rate * mixture->storage(porosity) * sqrt(at.pressure * at.pressure));
+                  V * level.pressure_rate * mixture.storage(at.porosity) * sqrt(at.pressure * at.pressure));
   std::array<Lanes, dim> flux;
   for (unsigned int d = 0; d < dim; ++d)
-    flux[d] = mobility * (mixture->fluid_density() * (loads.gravity[d] - inertia * at.acceleration[d]) -
+    flux[d] = mobility * (mixture.fluid_density() * (loads.gravity[d] - inertia * at.acceleration[d]) -
                           at.pressure_gradient[d]);
   for (unsigned int i = 0; i < n_p; ++i) {
     Lanes r = -V * storage * points.M[i];
@@ -201,40 +142,83 @@ void PointForm<dim, reach>::add_residual(const Body<dim> &body, const Points &po
 }
 
 template <int dim, unsigned int reach>
-void PointForm<dim, reach>::add_matrices(const Body<dim> &body, const Points &points, const PointValues &at,
+void PointForm<dim, reach>::add_matrices(const Body<dim> &body, const std::size_t batch,
+                                         const TimeLevel &level, const VolumeLoads<dim> &loads,
                                          const bool has_pressure)
 {
-  std::array<Lanes, 36> tangent;
-  body.material().law().tangent(at.stress, at.memory.data(), tangent);
-  const Mixture *mixture = has_pressure ? body.material().mixture() : nullptr;
-  typename StackedPoints<dim, reach>::Coefficients c{};
-  if (mixture) {
-    const Lanes porosity = points.porosity(body.layout(), *mixture);
+  const PointValues &here = cell.state(batch);
+  const Mixture *mixture = body.material().mixture();
+  PointCoefficients c;
+  c.finite_strain = body.material().law().finite_strain();
+  body.material().law().tangent(here.law_stress, here.memory.data(), c.tangent);
+  c.law_stress = here.law_stress;
+  c.total_stress = here.stress;
+  for (unsigned int i = 0; i < 3 && mixture; ++i)
+    c.total_stress[i] -= mixture->biot_coefficient() * here.pressure;
+  c.volume_at_start = here.volume_at_start;
+  c.volume_ratio = c.finite_strain ? 1. + here.dilatation : broadcast(1.);
+  if (has_pressure) {
     c.alpha = mixture->biot_coefficient();
     c.fluid_density = mixture->fluid_density();
-    c.storage = mixture->storage(porosity);
-    c.mobility = mixture->mobility(porosity);
+    c.storage = mixture->storage(here.porosity);
+    c.mobility = mixture->mobility(here.porosity);
   }
-  stacked.add(points, tangent, c, has_pressure);
+  if (has_pressure && c.finite_strain) {
+    // n gains 1 - n per volumetric strain. 1/Q is linear in it.
+    constexpr double step = 1e-5;
+    const Lanes solid = 1. - here.porosity;
+    c.storage_rate =
+        fluid_storage_rate(body, cell.points(batch), level, here, loads) +
+        here.pressure_rate * solid * (mixture->storage(broadcast(1.)) - mixture->storage(broadcast(0.)));
+    c.mobility_slope = solid *
+                       (mixture->mobility(here.porosity + step) - mixture->mobility(here.porosity - step)) /
+                       (2. * step);
+    const double inertia = level.seepage_inertia ? 1. : 0.;
+    for (unsigned int d = 0; d < dim; ++d) {
+      c.p_slope[d] = here.pressure_gradient[d];
+      c.drive[d] = mixture->fluid_density() * (loads.gravity[d] - inertia * here.acceleration[d]) -
+                   here.pressure_gradient[d];
+    }
+    c.velocity_gradient = here.velocity_gradient;
+  }
+  matrices.add(cell.points(batch), c, cell.projection() ? &cell.projection()->functions(batch) : nullptr,
+               has_pressure);
+}
+
+template <int dim, unsigned int reach>
+double PointForm<dim, reach>::compliance(const Body<dim> &body) const
+{
+  double largest = 0.;
+  std::array<Lanes, 36> tangent;
+  std::array<Lanes, max_state_columns> memory;
+  for (std::size_t b = 0; b < cell.n_batches(); ++b) {
+    const Points &some = cell.points(b);
+    for (unsigned int c = 0; c < body.layout().n_state; ++c)
+      memory[c] = some.load(body.layout().state + c);
+    body.material().law().tangent(some.stress(body.layout()), memory.data(), tangent);
+    for (unsigned int l = 0; l < some.n; ++l)
+      largest = std::max({largest, 1. / tangent[0][l], tangent[21][l] > 0. ? 0.25 / tangent[21][l] : 0.});
+  }
+  return largest;
 }
 
 template <int dim, unsigned int reach>
 void PointForm<dim, reach>::stabilise(const Body<dim> &body, const Slice &slice, const TimeLevel &level,
-                                      const CellValues &values, const double strength, const bool with_matrix)
+                                      const double strength, const bool with_matrix)
 {
+  if (level.pressure_rate == 0.)
+    return;
   // Polynomial pressure projection (Dohrmann and Bochev 2004; White and Borja 2008): tau (q - mean q)(p_t -
   // mean p_t), on the cell and scaled by how full it is.
   const Mixture &mixture = *body.material().mixture();
-  double volume = 0.;
-  for (std::uint32_t i = slice.begin; i < slice.end; ++i)
-    volume += body.row(body.handles()[i])[body.layout().volume];
+  const double volume = cell.volume_at_start();
   double h = std::numeric_limits<double>::max();
   for (unsigned int d = 0; d < dim; ++d)
     h = std::min(h, space.grid().size(slice.cell, d));
   const double tau =
-      strength * std::max(0., stacked.compliance() * 3. * std::pow(mixture.biot_coefficient(), 2) +
+      strength * std::max(0., compliance(body) * 3. * std::pow(mixture.biot_coefficient(), 2) +
                                   2. * mixture.storage() - 12. * mixture.mobility() * level.dt / (h * h));
-  if (tau == 0. || level.pressure_rate == 0.)
+  if (tau == 0.)
     return;
   for (unsigned int i = 0; i < n_p; ++i)
     for (unsigned int j = 0; j < n_p; ++j) {
@@ -243,7 +227,8 @@ void PointForm<dim, reach>::stabilise(const Body<dim> &body, const Slice &slice,
         product *= ((i ^ j) >> d) & 1 ? 1. / 6. : 1. / 3.;
       const double entry = tau * volume * (product - 1. / (n_p * n_p)) * level.fluid_scale();
       local_residual[n_u + i] -=
-          entry * (level.pressure_rate * (values.P[j] - values.old_P[j]) + values.rate_history[j]);
+          entry * (level.pressure_rate * (cell.values().P[j] - cell.values().old_P[j]) +
+                   cell.values().rate_history[j]);
       if (with_matrix)
         local_matrix(n_u + i, n_u + j) += level.pressure_rate * entry;
     }
@@ -252,60 +237,92 @@ void PointForm<dim, reach>::stabilise(const Body<dim> &body, const Slice &slice,
 template <int dim, unsigned int reach>
 void PointForm<dim, reach>::assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
                                      const VolumeLoads<dim> &loads, const double stabilisation,
-                                     const dealii::AffineConstraints<double> &constraints,
-                                     BlockVector &residual, BlockMatrix *matrix,
-                                     dealii::TrilinosWrappers::SparseMatrix *pressure_mass,
-                                     GrossResidual &gross)
+                                     const UpSystem &system)
 {
   const bool saturated = body.material().mixture() != nullptr;
   const bool has_pressure = saturated && space.has_pressure();
   const unsigned int n = n_u + (has_pressure ? n_p : 0);
   unknowns.resize(n);
   local_residual.reinit(n);
-  if (matrix)
+  if (system.matrix)
     local_matrix.reinit(n, n);
-  CellValues values;
-  PointValues at;
   for (const Slice &slice : body.slices()) {
-    load(slice.cell, saturated, level, state, values);
-    const double mean = saturated && !has_pressure ? mean_pressure(body, slice) : 0.;
+    cell.load(slice.cell, saturated, level, state);
     local_residual = 0.;
-    stacked.clear(slice.end - slice.begin);
-    for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
-      const Points points(space.grid(), body, slice, begin);
-      evaluate(body, points, level, values, mean, at);
-      add_residual(body, points, level, at, loads, has_pressure, gross);
-      if (matrix || (has_pressure && stabilisation > 0.))
-        add_matrices(body, points, at, has_pressure);
+    cell.evaluate(body, slice, level, saturated && !has_pressure ? mean_pressure(body, slice) : 0.);
+    for (std::size_t b = 0; b < cell.n_batches(); ++b)
+      add_residual(body, cell.points(b), level, cell.state(b), loads, has_pressure, system.gross);
+    if (system.matrix) {
+      matrices.clear(slice.end - slice.begin, body.material().law().finite_strain());
+      for (std::size_t b = 0; b < cell.n_batches(); ++b)
+        add_matrices(body, b, level, loads, has_pressure);
+      matrices.multiply(level, cell.norms(), has_pressure, local_matrix);
     }
-    if (matrix)
-      stacked.multiply(level, has_pressure, local_matrix);
     if (has_pressure && stabilisation > 0.)
-      stabilise(body, slice, level, values, stabilisation, matrix != nullptr);
+      stabilise(body, slice, level, stabilisation, system.matrix != nullptr);
 
     std::copy_n(space.displacements(slice.cell), n_u, unknowns.begin());
     if (has_pressure)
       std::copy_n(space.pressures(slice.cell), n_p, unknowns.begin() + n_u);
-    residual.add(unknowns, local_residual);
-    if (matrix)
-      constraints.distribute_local_to_global(local_matrix, unknowns, *matrix);
-    if (matrix && pressure_mass && has_pressure)
-      add_pressure_mass(level, constraints, *pressure_mass);
+    system.residual.add(unknowns, local_residual);
+    if (system.matrix)
+      distribute(level, has_pressure, system);
   }
 }
 
 template <int dim, unsigned int reach>
-void PointForm<dim, reach>::add_pressure_mass(const TimeLevel &level,
-                                              const dealii::AffineConstraints<double> &constraints,
-                                              dealii::TrilinosWrappers::SparseMatrix &matrix)
+void PointForm<dim, reach>::distribute(const TimeLevel &level, const bool has_pressure,
+                                       const UpSystem &system)
 {
-  const auto mass = stacked.pressure_mass();
+  system.constraints.distribute_local_to_global(local_matrix, unknowns, *system.matrix);
+  if (system.pressure_mass && has_pressure)
+    add_pressure_mass(level, system);
+  if (system.split)
+    add_split(level, has_pressure, system);
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::add_pressure_mass(const TimeLevel &level, const UpSystem &system)
+{
+  const auto mass = matrices.pressure_mass(cell.norms());
   for (unsigned int i = 0; i < n_p; ++i)
     for (unsigned int j = 0; j < n_p; ++j) {
       const auto row = unknowns[n_u + i], column = unknowns[n_u + j];
-      if (row == column || (!constraints.is_constrained(row) && !constraints.is_constrained(column)))
-        matrix.add(row - space.first_pressure(), column - space.first_pressure(), level.share * mass(i, j));
+      if (row == column ||
+          (!system.constraints.is_constrained(row) && !system.constraints.is_constrained(column)))
+        system.pressure_mass->add(row - space.first_pressure(), column - space.first_pressure(),
+                                  level.share * mass(i, j));
     }
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::add_split(const TimeLevel &level, const bool has_pressure, const UpSystem &system)
+{
+  VolumetricSplit &split = *system.split;
+  const auto &norms = *cell.norms();
+  const auto volumetric = matrices.volumetric(norms, has_pressure);
+  dealii::FullMatrix<double> shear(n_u, n_u);
+  for (unsigned int i = 0; i < n_u; ++i)
+    for (unsigned int j = 0; j < n_u; ++j) {
+      shear(i, j) = local_matrix(i, j);
+      for (unsigned int k = 0; k < Matrices::n_psi; ++k)
+        shear(i, j) -= level.share * volumetric.modulus[k] / norms[k] * volumetric.gradient(k, i) *
+                       volumetric.gradient(k, j);
+    }
+  const std::vector<dealii::types::global_dof_index> displacements(unknowns.begin(), unknowns.begin() + n_u);
+  system.constraints.distribute_local_to_global(shear, displacements, split.shear);
+  for (unsigned int k = 0; k < Matrices::n_psi; ++k) {
+    const auto number = split.next++;
+    for (unsigned int i = 0; i < n_u; ++i)
+      if (!system.constraints.is_constrained(displacements[i]))
+        split.gradient.add(displacements[i], number, volumetric.gradient(k, i));
+    split.volumetric_compliance(number) = norms[k] / (level.share * volumetric.modulus[k]);
+    split.shear_compliance(number) = norms[k] / (2. * level.share * volumetric.shear_modulus);
+    for (unsigned int i = 0; i < n_p && has_pressure; ++i)
+      if (!system.constraints.is_constrained(unknowns[n_u + i]))
+        split.projection.add(number, unknowns[n_u + i] - space.first_pressure(),
+                             level.share * volumetric.projection(k, i));
+  }
 }
 
 template <int dim, unsigned int reach>
@@ -315,55 +332,63 @@ void PointForm<dim, reach>::update_points(Body<dim> &body, const TimeLevel &leve
                                           StepWork &work)
 {
   const Layout &layout = body.layout();
-  const Law &law = body.material().law();
   const Mixture *mixture = body.material().mixture();
-  const double inertia = level.seepage_inertia ? 1. : 0.;
-  CellValues values;
-  PointValues at;
   TimeLevel end = level;
   end.share = 1.;
   for (const Slice &slice : body.slices()) {
-    load(slice.cell, mixture != nullptr, level, state, values);
-    gather(end_velocity, space.displacements(slice.cell), n_u, 0, 0, values.end_velocity);
-    for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
-      const Points points(space.grid(), body, slice, begin);
-      if (values.has_pressure) {
-        evaluate(body, points, level, values, 0., at);
-        const Lanes porosity = points.porosity(layout, *mixture);
-        Lanes squared = {};
-        for (unsigned int d = 0; d < dim; ++d) {
-          const Lanes R = mixture->fluid_density() * (gravity[d] - inertia * at.acceleration[d]) -
-                          at.pressure_gradient[d];
-          squared += R * R;
-        }
-        const Lanes squeezed = mixture->biot_coefficient() * at.velocity_divergence;
-        work.seepage_dissipation += level.dt * sum(points.volume * mixture->mobility(porosity) * squared);
-        work.seepage_work += level.dt * sum(points.volume * at.pressure *
-                                            (mixture->storage(porosity) * at.pressure_rate + squeezed));
-        if (!law.finite_strain())
-          work.fluid_squeezed += level.dt * sum(points.volume * squeezed);
-      }
-      evaluate(body, points, end, values, 0., at);
-      points.store(body, layout, at.stress, at.memory.data());
+    cell.load(slice.cell, mixture != nullptr, level, state);
+    cell.load_end_velocity(slice.cell, end_velocity);
+    const auto &values = cell.values();
+    if (values.has_pressure) {
+      cell.evaluate(body, slice, level, 0.);
+      for (std::size_t b = 0; b < cell.n_batches(); ++b)
+        book_seepage(body, cell.points(b), level, cell.state(b), gravity, work);
+    }
+    cell.evaluate(body, slice, end, 0.);
+    for (std::size_t b = 0; b < cell.n_batches(); ++b) {
+      const Points &some = cell.points(b);
+      const PointValues &here = cell.state(b);
+      some.store(body, layout, here.stress, here.memory.data());
       if (values.has_pressure)
-        points.store(layout.pressure, at.pressure);
-      Lanes check = at.stress[0] + at.stress[1] + at.stress[2] + at.stress[3] + at.pressure;
+        some.store(layout.pressure, here.pressure);
+      Lanes check = here.stress[0] + here.stress[1] + here.stress[2] + here.stress[3] + here.pressure;
       for (unsigned int d = 0; d < dim; ++d) {
-        const Lanes u = points.value(values.U, d), v = points.value(values.end_velocity, d);
-        points.store(layout.displacement + d, points.load(layout.displacement + d) + u);
-        points.store(layout.velocity + d, v);
+        const Lanes u = some.value(values.U, d), v = some.value(values.end_velocity, d);
+        some.store(layout.displacement + d, some.load(layout.displacement + d) + u);
+        some.store(layout.velocity + d, v);
         check += v;
       }
       if (layout.velocity_gradient >= 0) {
-        const GradientLanes L = points.gradient(values.end_velocity);
+        const GradientLanes L = some.gradient(values.end_velocity);
         for (unsigned int d = 0; d < dim; ++d)
           for (unsigned int e = 0; e < dim; ++e)
-            points.store(layout.velocity_gradient + d * dim + e, L[3 * d + e]);
+            some.store(layout.velocity_gradient + d * dim + e, L[3 * d + e]);
       }
       work.finite = work.finite && std::isfinite(sum(check));
-      points.deform(body, at.gradient, values.U, move);
+      some.deform(body, here.gradient, values.U, move);
     }
   }
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::book_seepage(const Body<dim> &body, const Points &points, const TimeLevel &level,
+                                         const PointValues &at, const dealii::Tensor<1, dim> &gravity,
+                                         StepWork &work) const
+{
+  const Mixture &mixture = *body.material().mixture();
+  const double inertia = level.seepage_inertia ? 1. : 0.;
+  Lanes squared = {};
+  for (unsigned int d = 0; d < dim; ++d) {
+    const Lanes R =
+        mixture.fluid_density() * (gravity[d] - inertia * at.acceleration[d]) - at.pressure_gradient[d];
+    squared += R * R;
+  }
+  const Lanes squeezed = mixture.biot_coefficient() * at.velocity_divergence;
+  work.seepage_dissipation += level.dt * sum(points.volume * mixture.mobility(at.porosity) * squared);
+  work.seepage_work += level.dt * sum(points.volume * at.pressure *
+                                      (mixture.storage(at.porosity) * at.pressure_rate + squeezed));
+  if (!body.material().law().finite_strain())
+    work.fluid_squeezed += level.dt * sum(points.volume * squeezed);
 }
 
 template <int dim, unsigned int reach>
@@ -416,7 +441,8 @@ void PointForm<dim, reach>::sum_weight(const Body<dim> &body, const StepState &s
 {
   double U[n_u];
   for (const Slice &slice : body.slices()) {
-    gather(state.unknown, space.displacements(slice.cell), n_u, 0, 0, U);
+    for (unsigned int i = 0; i < n_u; ++i)
+      U[i] = state.unknown.block(0)(space.displacements(slice.cell)[i]);
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       const Points points(space.grid(), body, slice, begin);
       for (unsigned int l = 0; l < points.n; ++l) {
@@ -433,16 +459,35 @@ void PointForm<dim, reach>::sum_weight(const Body<dim> &body, const StepState &s
 }
 } // namespace
 
+void VolumetricSplit::clear()
+{
+  shear = 0.;
+  gradient = 0.;
+  if (projection.m() > 0)
+    projection = 0.;
+  next = first;
+}
+
+void VolumetricSplit::compress()
+{
+  shear.compress(dealii::VectorOperation::add);
+  gradient.compress(dealii::VectorOperation::add);
+  if (projection.m() > 0)
+    projection.compress(dealii::VectorOperation::add);
+  volumetric_compliance.compress(dealii::VectorOperation::insert);
+  shear_compliance.compress(dealii::VectorOperation::insert);
+}
+
 template <int dim>
-std::unique_ptr<UpForm<dim>> UpForm<dim>::make(const Space<dim> &space)
+std::unique_ptr<UpForm<dim>> UpForm<dim>::make(const Space<dim> &space, const bool projects)
 {
   switch (space.nodes()) {
   case Nodes::q1:
-    return std::make_unique<PointForm<dim, 2>>(space);
+    return std::make_unique<PointForm<dim, 2>>(space, projects);
   case Nodes::q2:
-    return std::make_unique<PointForm<dim, 3>>(space);
+    return std::make_unique<PointForm<dim, 3>>(space, projects);
   default:
-    return std::make_unique<PointForm<dim, 4>>(space);
+    return std::make_unique<PointForm<dim, 4>>(space, projects);
   }
 }
 

@@ -18,6 +18,25 @@ bool is_linear(const Scene<dim> &scene)
   });
 }
 
+template <int dim>
+bool has_finite_strain(const Scene<dim> &scene)
+{
+  return std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                     [](const auto &body) { return body->material().law().finite_strain(); });
+}
+
+/// Above nu = 0.45 multigrid on the whole stiffness becomes slow.
+template <int dim>
+bool is_nearly_incompressible(const Scene<dim> &scene)
+{
+  constexpr double lambda_over_mu = 9.;
+  return std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const auto &body) {
+    std::array<Lanes, 36> tangent;
+    body->material().initial_tangent(tangent);
+    return tangent[1][0] > lambda_over_mu * tangent[21][0];
+  });
+}
+
 bool same(const TimeLevel &a, const TimeLevel &b)
 {
   const auto equal = [](const double x, const double y) { return std::abs(x - y) <= 1e-10 * std::abs(x); };
@@ -33,8 +52,11 @@ UpSolver<dim>::UpSolver(const ImplicitParameters &parameters, const LinearSolver
                         const Grid<dim> &grid, Scene<dim> &scene, const double start_time,
                         const Ledger<dim> &carried)
     : parameters(parameters), method(method), seepage_inertia(seepage_inertia), grid(grid), scene(scene),
-      linear(is_linear(scene)), unknowns(grid, displacement),
-      active(grid, displacement == Nodes::gimp ? 4 : 2), form(UpForm<dim>::make(unknowns)),
+      linear(is_linear(scene)), finite_strain(has_finite_strain(scene)),
+      nearly_incompressible(is_nearly_incompressible(scene)), unknowns(grid, displacement),
+      active(grid, displacement == Nodes::gimp ? 4 : 2),
+      // What is to rest under the explicit step must be in equilibrium without the projection.
+      form(UpForm<dim>::make(unknowns, method != Method::points_at_rest)),
       boundary(unknowns, scene, parameters.surface_penalty),
       linear_solver(linear_parameters, "an implicit step"), now(start_time), book(carried)
 {}
@@ -119,6 +141,11 @@ void UpSolver<dim>::resize()
   matrix.reinit(unknowns.owned(), pattern, communicator);
   matrix_is_valid = false;
   describe_unknowns();
+  prepare_split();
+  if (method == Method::finite_elements && finite_strain) {
+    moved.reinit(unknowns.owned()[0], communicator);
+    state.moved.reinit(unknowns.owned()[0], unknowns.relevant()[0], communicator);
+  }
 
   for (BlockVector *vector : {&unknown, &correction, &residual, &right_side, &rate, &second, &total})
     vector->reinit(unknowns.owned(), communicator);
@@ -162,12 +189,73 @@ void UpSolver<dim>::describe_unknowns()
 }
 
 template <int dim>
+void UpSolver<dim>::prepare_split()
+{
+  split.reset();
+  const unsigned int n_psi = form->n_volumetric();
+  if (!nearly_incompressible || n_psi == 0 || linear_solver.would_be_direct(unknowns.n_unknowns()))
+    return;
+  const MPI_Comm communicator = grid.communicator();
+  unsigned long mine = 0, first = 0;
+  for (const auto &body : scene.bodies)
+    mine += body->slices().size() * n_psi;
+  const int ierr = MPI_Exscan(&mine, &first, 1, MPI_UNSIGNED_LONG, MPI_SUM, communicator);
+  AssertThrowMPI(ierr);
+  if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0)
+    first = 0;
+  dealii::IndexSet functions(dealii::Utilities::MPI::sum(mine, communicator));
+  functions.add_range(first, first + mine);
+
+  split = std::make_unique<VolumetricSplit>();
+  split->first = first;
+  const dealii::IndexSet &u = unknowns.owned()[0];
+  dealii::TrilinosWrappers::SparsityPattern gradient(u, functions, unknowns.relevant()[0], communicator);
+  std::unique_ptr<dealii::TrilinosWrappers::SparsityPattern> projection;
+  if (unknowns.has_pressure())
+    projection = std::make_unique<dealii::TrilinosWrappers::SparsityPattern>(functions, unknowns.owned()[1],
+                                                                             communicator);
+  std::vector<typename Space<dim>::Index> pressures(Space<dim>::n_pressures), own(n_psi);
+  for (const auto &body : scene.bodies)
+    for (const Slice &slice : body->slices()) {
+      for (auto &number : own)
+        number = first++;
+      const auto *cell = unknowns.displacements(slice.cell);
+      for (unsigned int i = 0; i < unknowns.n_cell_nodes() * dim; ++i)
+        gradient.add_entries(cell[i], own.begin(), own.end());
+      if (!projection || !body->material().mixture())
+        continue;
+      for (unsigned int i = 0; i < Space<dim>::n_pressures; ++i)
+        pressures[i] = unknowns.pressures(slice.cell)[i] - unknowns.first_pressure();
+      for (const auto number : own)
+        projection->add_entries(number, pressures.begin(), pressures.end());
+    }
+  gradient.compress();
+  split->gradient.reinit(gradient);
+  if (projection) {
+    projection->compress();
+    split->projection.reinit(*projection);
+  }
+  split->shear.reinit(matrix.block(0, 0));
+  split->volumetric_compliance.reinit(functions, communicator);
+  split->shear_compliance.reinit(functions, communicator);
+}
+
+template <int dim>
 void UpSolver<dim>::prepare_linear_solver(const TimeLevel &level, const bool coupled)
 {
   PreconditionerData data;
   if (coupled && unknowns.has_pressure()) {
     pressure_mass.compress(dealii::VectorOperation::add);
     data.pressure_mass = &pressure_mass;
+  }
+  if (split && level.share > 0.) {
+    data.shear = &split->shear;
+    data.gradient = &split->gradient;
+    data.volumetric_compliance = &split->volumetric_compliance;
+    data.shear_compliance = &split->shear_compliance;
+    data.n_psi_per_cell = form->n_volumetric();
+    if (data.pressure_mass)
+      data.projection = &split->projection;
   }
   if (level.acceleration > 0.) {
     // What the diagonal must be multiplied with to bound the mass matrix of these elements.
@@ -213,14 +301,21 @@ void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
     matrix = 0.;
     if (pressure_mass.m() > 0)
       pressure_mass = 0.;
+    if (split)
+      split->clear();
   }
   share_unknown();
   const VolumeLoads<dim> loads = volume_loads(level.time);
   gross = {};
   const double stabilisation = unknowns.nodes() == Nodes::q2 ? 0. : parameters.stabilisation;
+  UpSystem system{boundary.constraints(), residual, gross};
+  if (with_matrix) {
+    system.matrix = &matrix;
+    system.pressure_mass = pressure_mass.m() > 0 ? &pressure_mass : nullptr;
+    system.split = level.share > 0. ? split.get() : nullptr;
+  }
   for (const auto &body : scene.bodies)
-    form->assemble(*body, level, state, loads, stabilisation, boundary.constraints(), residual,
-                   with_matrix ? &matrix : nullptr, pressure_mass.m() > 0 ? &pressure_mass : nullptr, gross);
+    form->assemble(*body, level, state, loads, stabilisation, system);
   boundary.assemble(level, state, residual, with_matrix ? &matrix : nullptr);
   residual.compress(dealii::VectorOperation::add);
   right_side = residual;
@@ -242,6 +337,13 @@ void UpSolver<dim>::fill_empty_diagonal(const TimeLevel &level)
       if (matrix.block(b, b).diag_element(index) == 0.)
         matrix.block(b, b).set(index, index, b == 0 ? 1. : level.fluid_scale());
   matrix.compress(dealii::VectorOperation::insert);
+  if (!split || level.share == 0.)
+    return;
+  split->compress();
+  for (const auto index : unknowns.owned()[0])
+    if (split->shear.diag_element(index) == 0.)
+      split->shear.set(index, index, matrix.block(0, 0).diag_element(index));
+  split->shear.compress(dealii::VectorOperation::insert);
 }
 
 template <int dim>
@@ -350,8 +452,9 @@ void UpSolver<dim>::project_start()
   residual = 0.;
   matrix = 0.;
   share_unknown();
+  const UpSystem system{boundary.unused(), residual, gross, &matrix};
   for (const auto &body : scene.bodies)
-    form->assemble(*body, level, state, {}, 0., boundary.unused(), residual, &matrix, nullptr, gross);
+    form->assemble(*body, level, state, {}, 0., system);
   residual.compress(dealii::VectorOperation::add);
   residual.block(0) = 0.;
   fill_empty_diagonal(level);
@@ -390,6 +493,10 @@ void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
   book.seepage_dissipation += work.seepage_dissipation;
   book.seepage_work += work.seepage_work;
   total += unknown;
+  if (moved.size() > 0) {
+    moved += unknown.block(0);
+    state.moved = moved;
+  }
   if (unknowns.has_pressure())
     second.block(1) = unknown.block(1);
   int finite = work.finite;

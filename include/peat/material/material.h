@@ -23,6 +23,8 @@ public:
   const Mixture *mixture() const { return pores.get(); }
   /// Stiffness of the skeleton to a plane compression wave at the start, without stress [Pa].
   double initial_modulus() const;
+  /// The law's tangent at the start, without stress [Pa].
+  void initial_tangent(std::array<Lanes, 36> &tangent) const;
   /// Mass per volume at the start, of the mixture if saturated [kg/m^3].
   double density() const { return pores ? pores->density() : dry_density; }
 

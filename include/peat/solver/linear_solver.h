@@ -66,7 +66,7 @@ struct PreconditionerData
   const Vector *volumetric_compliance = nullptr; ///< int psi psi / (c_k lambda), diagonal [n_psi]
   const Vector *shear_compliance = nullptr;      ///< int psi psi / (2 c_k mu), diagonal [n_psi]
   /// c_k int alpha psi N_p / int psi psi [n_psi][n_p], the projection on the cells; columns of constrained
-  /// unknowns are 0. Only with a p block.
+  /// unknowns are 0. Only with a p block that couples.
   const Matrix *projection = nullptr;
   unsigned int n_psi_per_cell = 1; ///< these stand together, the constant first
 };
@@ -115,13 +115,15 @@ public:
   unsigned int solve(BlockVector &solution, const BlockVector &rhs);
 
   bool is_direct() const { return direct; }
+  /// Whether a system of so many unknowns will be solved directly: what only a preconditioner needs then need
+  /// not be assembled.
+  bool would_be_direct(dealii::types::global_dof_index n_unknowns) const;
   /// Number of preconditioners or factorisations made so far.
   unsigned int n_preconditioners() const { return n_builds; }
 
   class Preconditioner;
 
 private:
-  bool choose_direct() const;
   void build();
   void find_scaling();
   /// Solves for the volumetric stress beside u and p.

@@ -40,6 +40,9 @@ struct StepState
   BlockVector unknown;        ///< U [m], P [Pa]
   BlockVector rate_history;   ///< v_history [m/s], rate_history [Pa/s]
   BlockVector second_history; ///< a_history [m/s^2]; the pressure block is p_n [Pa]
+  /// Displacement of finite elements of finite strain up to t_n [m]; empty where nodes start each step at
+  /// their places in the mesh.
+  dealii::TrilinosWrappers::MPI::Vector moved;
 };
 
 /// What the points take from the fluid and the skeleton in a step; one rank's share.
@@ -63,6 +66,32 @@ struct VolumeLoads
   std::vector<const Condition<dim> *> forces, fluids;
 };
 
+/// The stiffness as that without its volumetric part, and what is left: A = shear + G W^-1 G^T; see
+/// PreconditionerData, whose names these are. Functions psi are numbered in the order of assembly.
+struct VolumetricSplit
+{
+  dealii::TrilinosWrappers::SparseMatrix shear, gradient, projection;
+  dealii::TrilinosWrappers::MPI::Vector volumetric_compliance, shear_compliance;
+  dealii::types::global_dof_index first = 0; ///< of this rank
+  dealii::types::global_dof_index next = 0;
+
+  void clear();
+  /// Collective.
+  void compress();
+};
+
+/// What assemble() adds to; null what is not wanted.
+struct UpSystem
+{
+  const dealii::AffineConstraints<double> &constraints;
+  BlockVector &residual; ///< right side minus left side, without regard to constraints
+  GrossResidual &gross;
+  BlockMatrix *matrix = nullptr; ///< minus the residual's derivative, constrained
+  /// Only with `matrix`: the fixed-stress mass and the split, see PreconditionerData.
+  dealii::TrilinosWrappers::SparseMatrix *pressure_mass = nullptr;
+  VolumetricSplit *split = nullptr;
+};
+
 /// The weak form of the u-p equations (theory.md, eqs. 2 and 3) as sums over points with weights in cells:
 /// Gauss points make it the finite element method, material points the implicit material point method.
 ///
@@ -70,26 +99,29 @@ struct VolumeLoads
 ///   0 = sum V [ - (p_t/Q + alpha div v) N_i + kappa R . grad N_i ] - outflow,   R = - grad p + rho_f (g - a)
 ///
 /// Stresses come from the points' own, which are those at t_n, and the gradient of share U. The storage term
-/// takes p_n from the points, too: they carry the pressure, and nothing is lost where they move.
+/// takes p_n from the points, too: they carry the pressure, and nothing is lost where they move. Bodies of a
+/// law of finite strain obey the equations at the places that their points have at the level's time (updated
+/// Lagrange), others at those of the start of the step.
 template <int dim>
 class UpForm
 {
 public:
   virtual ~UpForm() = default;
-  static std::unique_ptr<UpForm> make(const Space<dim> &space);
+  /// `projects`: the law sees volumetric strains by their projections on cells (theory.md, section 10), so
+  /// that nearly incompressible skeletons do not lock.
+  static std::unique_ptr<UpForm> make(const Space<dim> &space, bool projects);
 
-  /// Add the body's part of the residual (right side minus left side, without regard to constraints), and, if
-  /// `matrix` is not null, of the matrix (minus the residual's derivative, constrained). `pressure_mass` gets
-  /// the sum of share V alpha^2 / K N_p N_p with the drained bulk modulus K of dim dimensions, if it is not
-  /// null. Pressures act with their means over cells where the space has no pressure for a saturated body.
+  /// Functions psi of a body in a cell; 0 without projection.
+  virtual unsigned int n_volumetric() const = 0;
+
+  /// Add the body's part of the system. Pressures act with their means over cells where the space has no
+  /// pressure for a saturated body.
   virtual void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
-                        const VolumeLoads<dim> &loads, double stabilisation,
-                        const dealii::AffineConstraints<double> &constraints, BlockVector &residual,
-                        BlockMatrix *matrix, dealii::TrilinosWrappers::SparseMatrix *pressure_mass,
-                        GrossResidual &gross) = 0;
+                        const VolumeLoads<dim> &loads, double stabilisation, const UpSystem &system) = 0;
 
   /// Take the step: stress, state, pressure, displacement and velocity of the points from the unknowns and
-  /// the velocity at its end (in `end_velocity`); with `move`, also positions, volumes and extents.
+  /// the velocity at its end (in `end_velocity`); volumes and porosities under finite strain; with `move`,
+  /// also positions and extents.
   virtual void update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
                              const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity,
                              bool move, StepWork &work) = 0;

@@ -104,6 +104,8 @@ private:
   /// What is prescribed, or held by nothing, stands for itself.
   void fill_empty_diagonal(const TimeLevel &level);
   void describe_unknowns();
+  /// Room for the volumetric split, where the linear solver has a use for it.
+  void prepare_split();
   void prepare_linear_solver(const TimeLevel &level, bool coupled);
   void share_unknown();
   /// After the unknowns have been found: points, tracers, balances.
@@ -118,7 +120,7 @@ private:
   const bool seepage_inertia;
   const Grid<dim> &grid;
   Scene<dim> &scene;
-  const bool linear;
+  const bool linear, finite_strain, nearly_incompressible;
   std::vector<Scene<dim> *> followers;
 
   Space<dim> unknowns;
@@ -128,6 +130,7 @@ private:
   LinearSolver linear_solver;
   BlockMatrix matrix;
   dealii::TrilinosWrappers::SparseMatrix pressure_mass;
+  std::unique_ptr<VolumetricSplit> split;
   dealii::TrilinosWrappers::MPI::Vector inertia, mass_diagonal;
   bool matrix_is_valid = false;
   TimeLevel matrix_level;
@@ -136,6 +139,8 @@ private:
   BlockVector rate;                                      ///< v [m/s] and p_t [Pa/s] at the start of the step
   BlockVector second;                                    ///< a [m/s^2] and p [Pa]
   BlockVector total;                                     ///< displacement since the last reset [m]
+  dealii::TrilinosWrappers::MPI::Vector
+      moved; ///< the same since the start; of finite elements, finite strain
   BlockVector ghosted_total, ghosted_rate;
   StepState state;
 
