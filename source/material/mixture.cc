@@ -105,4 +105,16 @@ Lanes Mixture::stable_step(const Lanes porosity, const Lanes M, const Lanes h, c
   const Lanes c = sqrt((M + alpha * alpha * Q) / rho) + speed;
   return h * h / (D + sqrt(D * D + c * c * h * h));
 }
+
+Lanes Mixture::semi_implicit_speed(const Lanes porosity, const Lanes M, const Lanes density,
+                                   const bool seepage_inertia) const
+{
+  if (!seepage_inertia)
+    return sqrt(M / density);
+  // What is well posed at the start may come near the limit as the skeleton stiffens.
+  constexpr double least_margin = 0.01;
+  const Lanes r = alpha * rho_f / density;
+  const Lanes margin = 1. - r * M * storage(porosity) / (alpha * alpha * (1. - r));
+  return sqrt(M / (density - alpha * rho_f) / max(margin, broadcast(least_margin)));
+}
 } // namespace peat

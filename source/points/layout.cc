@@ -14,6 +14,8 @@ Layout::Layout(const unsigned int dim, const Material &material, const SchemeFie
   stress = add("effective stress", "Pa", dim == 2 ? 4 : 6, Kind::stress);
   if (material.mixture()) {
     pressure = add("pressure", "Pa", 1, Kind::scalar);
+    if (scheme.pressure_rate)
+      pressure_rate = add("pressure rate", "Pa/s", 1, Kind::scalar);
     if (material.law().finite_strain())
       porosity = add("porosity", "", 1, Kind::scalar);
   }

@@ -337,6 +337,7 @@ void Case<dim>::check(const Section &root) const
       root.subsection("Materials").subsection(body.material).fail("", message.str());
     }
   }
+  check_implicit_pressure(root);
   for (const auto &stage : stages)
     if (method == Method::fem && stage.local_damping > 0.)
       root.subsection("Stages")
@@ -377,6 +378,27 @@ void Case<dim>::check(const Section &root) const
                                       std::make_pair("Probe interval", output.probe_interval)})
     if (interval > 0. && end_time() / interval > most_lines)
       section.fail(key, "in " + to_text(end_time()) + " s this makes more than 1e7 entries");
+}
+
+template <int dim>
+void Case<dim>::check_implicit_pressure(const Section &root) const
+{
+  if (!scheme.implicit_pressure)
+    return;
+  const Section section = root.subsection("Explicit MPM");
+  if (!is_saturated())
+    section.fail("Pore pressure", "'implicit' is for saturated bodies, and there is none");
+  if (!contacts.empty())
+    section.fail("Pore pressure", "'implicit' does not go with 'Contacts' yet; use 'explicit'");
+  double alpha = -1.;
+  for (const auto &body : bodies)
+    if (const Mixture *mixture = material(body.material).mixture()) {
+      if (alpha >= 0. && mixture->biot_coefficient() != alpha)
+        section.fail("Pore pressure",
+                     "'implicit' needs the same 'Biot coefficient' in all saturated bodies; that of '" +
+                         body.name + "' differs");
+      alpha = mixture->biot_coefficient();
+    }
 }
 
 template <int dim>

@@ -261,7 +261,8 @@ void check_probes(const Case<dim> &parameters, const Grid<dim> &grid)
 template <int dim>
 void check_fixed_step(const Case<dim> &parameters, const Scene<dim> &scene, const Grid<dim> &grid)
 {
-  const StableStep stable = stable_step<dim>(scene.bodies, grid, parameters.scheme.seepage_inertia);
+  const StableStep stable = stable_step<dim>(scene.bodies, grid, parameters.scheme.seepage_inertia,
+                                              parameters.scheme.implicit_pressure);
   if (parameters.scheme.fixed_step <= stable.dt)
     return;
   std::ostringstream message;

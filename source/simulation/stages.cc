@@ -183,6 +183,20 @@ void Simulation<dim>::report_work() const
 }
 
 template <int dim>
+void Simulation<dim>::report_work(const PressureWork &work)
+{
+  pressure_work.solves += work.solves;
+  pressure_work.iterations += work.iterations;
+  pressure_work.multigrids += work.multigrids;
+  if (work.solves == 0)
+    return;
+  std::ostringstream text;
+  text << "implicit pressures: " << double(work.iterations) / work.solves << " iterations a step, "
+       << work.multigrids << " multigrid preconditioners";
+  log.line(text.str());
+}
+
+template <int dim>
 void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const double start)
 {
   const double end = start + stage.duration;
@@ -241,6 +255,7 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
                  steps.n_steps * double(scene.n_global_points()) / std::max(1e-9, wall.time_loop));
   }
   events.summarise(scene);
+  report_work(mpm.pressure_work());
 }
 
 template unsigned long Simulation<2>::unknowns_of_solver() const;

@@ -45,7 +45,8 @@ void Simulation<dim>::write_summary() const
   summary["case"] = parameters.title.empty() ? options.file : parameters.title;
   const bool fem = parameters.method == Method::fem;
   summary["method"] = fem ? "fem" : "mpm";
-  summary["scheme"] = unknowns_of_solver() > 0 ? "implicit" : "explicit";
+  summary["scheme"] = unknowns_of_solver() > 0 ? "implicit" :
+                      pressure_work.solves > 0 ? "semi-implicit" : "explicit";
   summary["dimension"] = dim;
   summary["ranks"] = n_ranks;
   summary["completed"] = !stopped && now >= planned_end;
@@ -58,6 +59,10 @@ void Simulation<dim>::write_summary() const
                              {"linear_systems", up_solver->work().linear_solves},
                              {"linear", up_solver->work().linear_iterations},
                              {"rejected_steps", up_solver->work().rejected_steps}};
+  if (pressure_work.solves > 0) {
+    summary["iterations"]["pressure_systems"] = pressure_work.solves;
+    summary["iterations"]["pressure"] = pressure_work.iterations;
+  }
   summary["simulated_time"] = number(now);
   summary["dt"] = {{"min", number(steps.smallest)},
                    {"max", number(steps.largest)},

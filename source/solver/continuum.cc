@@ -32,6 +32,29 @@ Continuum<dim>::Continuum(const SchemeParameters &scheme, const Grid<dim> &grid,
       has_loads = has_loads || condition->has_body_force();
     }
   has_loads = has_loads || !surfaces.empty();
+  if (scheme.implicit_pressure && saturated)
+    begin_implicit_pressure();
+}
+
+template <int dim>
+void Continuum<dim>::begin_implicit_pressure()
+{
+  double alpha = 0.;
+  for (std::size_t b = 0; b < members.size(); ++b)
+    if (const Mixture *mixture = body(b).material().mixture()) {
+      alpha = mixture->biot_coefficient();
+      // What an earlier stage left is not the rate of the step before.
+      for (std::uint32_t p = 0; p < body(b).n_local_points(); ++p)
+        body(b).row(p)[body(b).layout().pressure_rate] = 0.;
+    }
+  for (const auto &condition : conditions) {
+    using Fluid = typename Condition<dim>::Fluid;
+    constrains_flux =
+        constrains_flux || condition->fluid() == Fluid::flux || condition->fluid() == Fluid::impermeable;
+  }
+  pressure = std::make_unique<ImplicitPressure<dim>>(active, alpha, scheme.seepage_inertia,
+                                                     scheme.pressure_stabilisation, scheme.pressure_tolerance);
+  first_increment.resize(members.size());
 }
 
 template <int dim>
@@ -72,6 +95,21 @@ void Continuum<dim>::number_nodes(const std::vector<NodeId> &more_nodes)
       if (!open[b])
         for (const std::uint32_t i : active.on_boundary(b))
           closed_rows.push_back(std::size_t(i) * dim + b / 2);
+  if (!pressure)
+    return;
+  std::vector<CellId> cells;
+  for (std::size_t b = 0; b < members.size(); ++b)
+    if (body(b).material().mixture())
+      for (const Slice &slice : body(b).slices())
+        cells.push_back(slice.cell);
+  pressure->renumber(cells);
+  find_prescribed_rows();
+  freedom.moves.assign(prescribed.size(), 1);
+  for (std::size_t row = 0; row < prescribed.size(); ++row)
+    freedom.moves[row] = !prescribed[row];
+  freedom.flows.assign(prescribed.size(), 1);
+  for (const std::size_t row : closed_rows)
+    freedom.flows[row] = 0;
 }
 
 template <int dim>
@@ -174,18 +212,34 @@ void Continuum<dim>::find_small_nodes()
 template <int dim>
 void Continuum<dim>::points_to_nodes(const double time, const double dt)
 {
+  last_dt = nodal.dt;
   nodal.time = time;
   nodal.dt = dt;
   std::fill(nodal.sums.begin(), nodal.sums.end(), 0.);
-  for (std::size_t b = 0; b < members.size(); ++b)
-    kernels[b]->scatter(body(b), active, pressure_update(b), nodal.sums.data(), nodal.n_sums);
+  if (pressure)
+    pressure->sums.clear();
+  for (std::size_t b = 0; b < members.size(); ++b) {
+    CellSums *sums = nullptr;
+    if (pressure && body(b).material().mixture()) {
+      sums = &pressure->sums;
+      first_increment[b] = sums->storage.size();
+    }
+    kernels[b]->scatter(body(b), active, pressure_update(b), nodal.sums.data(), nodal.n_sums, sums);
+  }
   active.sum_over_ranks(nodal.sums.data(), nodal.n_sums);
 }
 
 template <int dim>
 PressureUpdate Continuum<dim>::pressure_update(const std::size_t member) const
 {
-  return {scheme.pressure_of_cells, 1. - std::exp(-filter_rates[member] * nodal.dt)};
+  PressureUpdate update;
+  update.cell_means = scheme.pressure_of_cells;
+  update.filter = 1. - std::exp(-filter_rates[member] * nodal.dt);
+  if (!pressure)
+    return update;
+  update.last_step = last_dt;
+  update.reach = extrapolation();
+  return update;
 }
 
 template <int dim>
@@ -298,6 +352,67 @@ void Continuum<dim>::solve_darcy()
 }
 
 template <int dim>
+void Continuum<dim>::find_freedom()
+{
+  // Conditions act on the flux node by node, in a linear way: what they make of unit vectors says how.
+  const std::vector<double> flux = nodal.flux;
+  std::array<std::vector<double>, dim + 1> images;
+  for (unsigned int c = 0; c <= dim; ++c) {
+    std::fill(nodal.flux.begin(), nodal.flux.end(), 0.);
+    for (std::size_t row = c; row < nodal.flux.size() && c < dim; row += dim)
+      nodal.flux[row] = 1.;
+    for (const std::size_t row : closed_rows)
+      nodal.flux[row] = 0.;
+    for (const auto &condition : conditions)
+      condition->constrain_flux(active, surface(*condition), nodal);
+    images[c] = nodal.flux;
+  }
+  nodal.flux = flux;
+  freedom.walls.clear();
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    dealii::Tensor<2, dim> map;
+    bool tilted = false;
+    for (unsigned int d = 0; d < dim; ++d)
+      for (unsigned int c = 0; c < dim; ++c) {
+        map[d][c] = images[c][i * dim + d] - images[dim][i * dim + d];
+        tilted = tilted || (c != d ? map[d][c] != 0. : map[d][c] != 0. && map[d][c] != 1.);
+      }
+    for (unsigned int d = 0; d < dim; ++d)
+      freedom.flows[i * dim + d] = tilted || map[d][d] == 1.;
+    if (tilted)
+      freedom.walls.emplace_back(i, map);
+  }
+}
+
+template <int dim>
+void Continuum<dim>::solve_pressure()
+{
+  if (!pressure)
+    return;
+  last_outflow = pressure->fluid_outflow();
+  last_squeezed = pressure->fluid_squeezed();
+  if (constrains_flux)
+    find_freedom();
+  pressure->solve(freedom, gravity_now, nodal);
+}
+
+template <int dim>
+void Continuum<dim>::book_fluid(Ledger<dim> &book) const
+{
+  if (!pressure) {
+    book.fluid_outflow += step_findings.fluid_outflow;
+    book.fluid_squeezed += step_findings.fluid_squeezed;
+    return;
+  }
+  // Points have the pressure of the end of the step, extrapolated; so must what they are held against.
+  const double now = extrapolation(), before = last_dt > 0. ? 0.5 : 0.;
+  book.fluid_outflow += now * pressure->fluid_outflow() - before * last_outflow;
+  const bool small_strain = body(0).layout().porosity < 0;
+  if (small_strain)
+    book.fluid_squeezed += now * pressure->fluid_squeezed() - before * last_squeezed;
+}
+
+template <int dim>
 void Continuum<dim>::advance_points()
 {
   // A node with little mass has large accelerations. A point that it reaches feels them by the node's weight,
@@ -329,13 +444,17 @@ void Continuum<dim>::deform_points()
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
   const double *w = nodal.flux.data();
   const char *spin_only = scheme.affine ? near_small_node.data() : nullptr;
-  for (std::size_t b = 0; b < members.size(); ++b)
+  for (std::size_t b = 0; b < members.size(); ++b) {
+    PressureUpdate pressures = pressure_update(b);
+    if (pressure && body(b).material().mixture())
+      pressures.increments = pressure->increments() + first_increment[b];
     if (remapped)
-      kernels[b]->deform(body(b), active, mapped_velocity.data(), w, spin_only, nodal.dt, pressure_update(b),
+      kernels[b]->deform(body(b), active, mapped_velocity.data(), w, spin_only, nodal.dt, pressures,
                          step_findings);
     else
       kernels[b]->advance_and_deform(body(b), active, nodal.acceleration.data(), nodal.new_velocity.data(), w,
-                                     spin_only, update, pressure_update(b), step_findings);
+                                     spin_only, update, pressures, step_findings);
+  }
 }
 
 template <int dim>
@@ -363,8 +482,7 @@ void Continuum<dim>::book_balances(Ledger<dim> &book) const
       }
     }
   }
-  book.fluid_outflow += step_findings.fluid_outflow;
-  book.fluid_squeezed += step_findings.fluid_squeezed;
+  book_fluid(book);
   book.external_work += nodal.dt * external;
   book.gravity_work += nodal.dt * gravity;
   book.seepage_dissipation += nodal.dt * dissipation;

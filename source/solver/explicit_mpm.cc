@@ -54,6 +54,7 @@ void ExplicitMPM<dim>::step(const double dt)
   contact.solve(now, dt, book);
   each([&](auto &continuum) { continuum.solve_darcy(); });
   contact.constrain_flux();
+  each([&](auto &continuum) { continuum.solve_pressure(); });
   each([&](auto &continuum) { continuum.advance_points(); });
   contact.constrain_carrying_velocity();
   each([&](auto &continuum) { continuum.deform_points(); });
@@ -70,6 +71,19 @@ double ExplicitMPM<dim>::largest_speed() const
   for (const auto &continuum : continua)
     speed = std::max(speed, continuum->findings().largest_speed);
   return speed;
+}
+
+template <int dim>
+PressureWork ExplicitMPM<dim>::pressure_work() const
+{
+  PressureWork sum;
+  for (const auto &continuum : continua)
+    if (const auto *pressure = continuum->implicit_pressure()) {
+      sum.solves += pressure->work().solves;
+      sum.iterations += pressure->work().iterations;
+      sum.multigrids += pressure->work().multigrids;
+    }
+  return sum;
 }
 
 template <int dim>
@@ -171,7 +185,7 @@ void ExplicitMPM<dim>::relocate_points()
 template <int dim>
 StableStep ExplicitMPM<dim>::stable_step() const
 {
-  return peat::stable_step<dim>(scene.bodies, grid, scheme.seepage_inertia);
+  return peat::stable_step<dim>(scene.bodies, grid, scheme.seepage_inertia, scheme.implicit_pressure);
 }
 
 template class ExplicitMPM<2>;

@@ -53,7 +53,8 @@ struct Speeds
 };
 
 template <int dim>
-Speeds speeds(const Body<dim> &body, const Slice &slice, const bool seepage_inertia)
+Speeds speeds(const Body<dim> &body, const Slice &slice, const bool seepage_inertia,
+              const bool implicit_pressure)
 {
   const Layout &layout = body.layout();
   const Law &law = body.material().law();
@@ -78,7 +79,10 @@ Speeds speeds(const Body<dim> &body, const Slice &slice, const bool seepage_iner
     }
     Lanes modulus = law.wave_modulus(stress, state);
     Lanes D = broadcast(0.);
-    if (mixture) {
+    if (mixture && implicit_pressure) {
+      const Lanes c = mixture->semi_implicit_speed(porosity, modulus, density, seepage_inertia);
+      modulus = c * c * density;
+    } else if (mixture) {
       const double alpha = mixture->biot_coefficient();
       const Lanes Q = 1. / mixture->storage(porosity);
       modulus += alpha * alpha * Q;
@@ -96,7 +100,8 @@ Speeds speeds(const Body<dim> &body, const Slice &slice, const bool seepage_iner
 }
 
 template <int dim>
-Limits limits(const Body<dim> &body, const Grid<dim> &grid, const bool seepage_inertia)
+Limits limits(const Body<dim> &body, const Grid<dim> &grid, const bool seepage_inertia,
+              const bool implicit_pressure)
 {
   Limits result;
   for (const Slice &slice : body.slices()) {
@@ -104,7 +109,7 @@ Limits limits(const Body<dim> &body, const Grid<dim> &grid, const bool seepage_i
     for (unsigned int d = 0; d < dim; ++d)
       h = std::min(h, grid.size(slice.cell, d));
     const SliverFactors factors = sliver_factors(body, slice, grid);
-    const Speeds fastest = speeds(body, slice, seepage_inertia);
+    const Speeds fastest = speeds(body, slice, seepage_inertia, implicit_pressure);
     const double c = fastest.wave / factors.wave;
     const double D = fastest.diffusion / factors.diffusion;
     const double dt = h * h / (D + std::sqrt(D * D + c * c * h * h));
@@ -118,11 +123,11 @@ Limits limits(const Body<dim> &body, const Grid<dim> &grid, const bool seepage_i
 
 template <int dim>
 StableStep stable_step(const std::vector<std::unique_ptr<Body<dim>>> &bodies, const Grid<dim> &grid,
-                       const bool seepage_inertia)
+                       const bool seepage_inertia, const bool implicit_pressure)
 {
   StableStep result{std::numeric_limits<double>::max(), ""};
   for (const auto &body : bodies) {
-    const Limits mine = limits(*body, grid, seepage_inertia);
+    const Limits mine = limits(*body, grid, seepage_inertia, implicit_pressure);
     const double dt = dealii::Utilities::MPI::min(mine.combined, grid.communicator());
     if (!(dt < result.dt))
       continue;
@@ -131,12 +136,13 @@ StableStep stable_step(const std::vector<std::unique_ptr<Body<dim>>> &bodies, co
     const unsigned int winner =
         dealii::Utilities::MPI::max(mine.combined == dt ? code : 0u, grid.communicator());
     result.dt = dt;
-    result.limit = std::string(winner % 2 == 0 ? "pressure diffusion" : "wave") + " in '" + body->name() +
+    result.limit = std::string(winner % 2 == 0 ? "pressure diffusion" :
+                               implicit_pressure && body->material().mixture() ? "skeleton wave" : "wave") + " in '" + body->name() +
                    "'" + (winner > 2 ? " (small piece of material)" : "");
   }
   return result;
 }
 
-template StableStep stable_step<2>(const std::vector<std::unique_ptr<Body<2>>> &, const Grid<2> &, bool);
-template StableStep stable_step<3>(const std::vector<std::unique_ptr<Body<3>>> &, const Grid<3> &, bool);
+template StableStep stable_step<2>(const std::vector<std::unique_ptr<Body<2>>> &, const Grid<2> &, bool, bool);
+template StableStep stable_step<3>(const std::vector<std::unique_ptr<Body<3>>> &, const Grid<3> &, bool, bool);
 } // namespace peat

@@ -47,6 +47,25 @@ double PointKernels<dim, reach, saturated>::mean_pressure(const Body<dim> &body,
 }
 
 template <int dim, unsigned int reach, bool saturated>
+void PointKernels<dim, reach, saturated>::sum_up(const Body<dim> &body, const Slice &slice,
+                                                 const double last_step, CellSums &cell_sums)
+{
+  const Layout &layout = body.layout();
+  const Mixture &mixture = *body.material().mixture();
+  double storage = 0., rate = 0., volume = 0.;
+  for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
+    const double *row = body.row(body.handles()[i]);
+    const double V = row[layout.volume];
+    storage += V * (layout.porosity >= 0 ? mixture.storage(broadcast(row[layout.porosity]))[0] :
+                                           mixture.storage());
+    rate += V * row[layout.pressure_rate];
+    volume += V;
+  }
+  cell_sums.storage.push_back(storage);
+  cell_sums.last_increment.push_back(last_step * rate / volume);
+}
+
+template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::node_offsets(const std::array<CellInterval, dim> &cell,
                                                        NodeLanes (*offset)[Chunks::n])
 {
@@ -60,19 +79,19 @@ void PointKernels<dim, reach, saturated>::node_offsets(const std::array<CellInte
 template <int dim, unsigned int reach, bool saturated>
 void PointKernels<dim, reach, saturated>::scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                   const PressureUpdate &pressure, double *sums,
-                                                  const unsigned int stride) const
+                                                  const unsigned int stride, CellSums *cell_sums) const
 {
   if (body.layout().velocity_gradient >= 0)
-    scatter_points<true>(body, nodes, pressure, sums, stride);
+    scatter_points<true>(body, nodes, pressure, sums, stride, cell_sums);
   else
-    scatter_points<false>(body, nodes, pressure, sums, stride);
+    scatter_points<false>(body, nodes, pressure, sums, stride, cell_sums);
 }
 
 template <int dim, unsigned int reach, bool saturated>
 template <bool affine>
 void PointKernels<dim, reach, saturated>::scatter_points(const Body<dim> &body, const ActiveNodes<dim> &nodes,
                                                          const PressureUpdate &pressure, double *sums,
-                                                         const unsigned int stride)
+                                                         const unsigned int stride, CellSums *cell_sums)
 {
   using S = Sums<dim>;
   constexpr unsigned int n_sums = S::n_columns(saturated);
@@ -118,7 +137,8 @@ void PointKernels<dim, reach, saturated>::scatter_points(const Body<dim> &body, 
         alpha_p = mixture->biot_coefficient() * p;
         reinterpret_cast<Lanes &>(darcy[0]) = V / f.kappa;
         reinterpret_cast<Lanes &>(darcy[1]) = V * mixture->fluid_density();
-        reinterpret_cast<Lanes &>(darcy[2]) = V * p;
+        // One pressure a cell: sums of V grad N, which are multiplied with it at the end.
+        reinterpret_cast<Lanes &>(darcy[2]) = pressure.cell_means ? V : V * p;
       }
       for (unsigned int c = 0; c < n_stress; ++c) {
         const Lanes s = batch.load(layout.stress + c);
@@ -167,6 +187,28 @@ void PointKernels<dim, reach, saturated>::scatter_points(const Body<dim> &body, 
       }
     }
 
+    if constexpr (saturated) {
+      if (cell_sums) {
+        sum_up(body, slice, pressure.last_step, *cell_sums);
+        for (unsigned int i = 0; i < Chunks::n_nodes; ++i) {
+          double slope[dim];
+          bool reached = false;
+          for (unsigned int d = 0; d < dim; ++d) {
+            slope[d] = local[S::pressure_force + d][i / Chunks::width][i % Chunks::width];
+            reached = reached || slope[d] != 0.;
+          }
+          if (!reached)
+            continue;
+          cell_sums->entry_node.push_back(cell_nodes[i]);
+          cell_sums->slopes.insert(cell_sums->slopes.end(), slope, slope + dim);
+        }
+        cell_sums->entry_begin.push_back(cell_sums->entry_node.size());
+      }
+      if (pressure.cell_means)
+        for (unsigned int d = 0; d < dim; ++d)
+          for (unsigned int chunk = 0; chunk < Chunks::n; ++chunk)
+            local[S::pressure_force + d][chunk] *= mean_p;
+    }
     for (unsigned int i = 0; i < Chunks::n_nodes; ++i) {
       double *out = sums + std::size_t(cell_nodes[i]) * stride;
       for (unsigned int c = 0; c < n_sums; ++c)
@@ -303,7 +345,7 @@ void PointKernels<dim, reach, saturated>::deform_batch(
     Body<dim> &body, const Batch<double> &batch, const std::array<CellInterval, dim> &cell,
     const std::array<Lanes, dim> &x, const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
     const double (*w)[Chunks::n_nodes], const bool spin_only, const double dt, const Divergences *cell_mean,
-    StepFindings &findings)
+    const PressureUpdate &pressure, const double *increment, StepFindings &findings)
 {
   const Layout &layout = body.layout();
   const Law &law = body.material().law();
@@ -348,18 +390,23 @@ void PointKernels<dim, reach, saturated>::deform_batch(
   Lanes check = stress[0] + stress[1] + stress[2] + speed_squared;
 
   if constexpr (saturated) {
-    const Mixture &mixture = *body.material().mixture();
-    const Divergences div = cell_mean ? *cell_mean : Divergences{divergence, divergence_of(weights, w)};
-    const Lanes Q =
-        layout.porosity < 0 ? broadcast(mixture.Q()) : 1. / mixture.storage(batch.load(layout.porosity));
-    const Lanes p = batch.load(layout.pressure) - dt * Q * (div.w + mixture.biot_coefficient() * div.v);
+    Lanes p = batch.load(layout.pressure);
+    if (increment) {
+      p += pressure.reach * *increment - 0.5 * pressure.last_step * batch.load(layout.pressure_rate);
+      batch.store(layout.pressure_rate, broadcast(*increment * inverse_dt));
+    } else {
+      const Mixture &mixture = *body.material().mixture();
+      const Divergences div = cell_mean ? *cell_mean : Divergences{divergence, divergence_of(weights, w)};
+      const Lanes Q =
+          layout.porosity < 0 ? broadcast(mixture.Q()) : 1. / mixture.storage(batch.load(layout.porosity));
+      p -= dt * Q * (div.w + mixture.biot_coefficient() * div.v);
+      const Lanes V = volumes(layout, batch);
+      findings.fluid_outflow += dt * sum(V * div.w);
+      if (layout.porosity < 0)
+        findings.fluid_squeezed += dt * mixture.biot_coefficient() * sum(V * div.v);
+    }
     batch.store(layout.pressure, p);
     check += p;
-
-    const Lanes V = volumes(layout, batch);
-    findings.fluid_outflow += dt * sum(V * div.w);
-    if (layout.porosity < 0)
-      findings.fluid_squeezed += dt * mixture.biot_coefficient() * sum(V * div.v);
   }
 
   if (law.finite_strain()) {
@@ -436,7 +483,9 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
     const std::uint32_t *cell_nodes = nodes.cell_nodes(slice.cell);
     gather(v, cell_nodes, local_v);
     const bool spin = spin_only && spin_only[nodes.occupied_index(slice.cell)];
-    const bool averaged = saturated && pressure.cell_means;
+    const double *increment =
+        pressure.increments ? pressure.increments + (&slice - body.slices().data()) : nullptr;
+    const bool averaged = saturated && pressure.cell_means && !increment;
     Divergences mean{};
     if constexpr (saturated) {
       gather(w, cell_nodes, local_w);
@@ -447,7 +496,7 @@ void PointKernels<dim, reach, saturated>::deform(Body<dim> &body, const ActiveNo
       collect(body, slice, begin, batch);
       evaluate(body, batch, cell, x, weights);
       deform_batch(body, batch, cell, x, weights, local_v, local_w, spin, dt, averaged ? &mean : nullptr,
-                   findings);
+                   pressure, increment, findings);
     }
     if (saturated && pressure.filter > 0.)
       filter_pressure(body, slice, pressure.filter);
@@ -473,7 +522,9 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, co
     gather(a, cell_nodes, local_a);
     gather(v, cell_nodes, local_v);
     const bool spin = spin_only && spin_only[nodes.occupied_index(slice.cell)];
-    const bool averaged = saturated && pressure.cell_means;
+    const double *increment =
+        pressure.increments ? pressure.increments + (&slice - body.slices().data()) : nullptr;
+    const bool averaged = saturated && pressure.cell_means && !increment;
     Divergences mean{};
     if constexpr (saturated) {
       gather(w, cell_nodes, local_w);
@@ -485,7 +536,7 @@ void PointKernels<dim, reach, saturated>::advance_and_deform(Body<dim> &body, co
       evaluate(body, batch, cell, x, weights);
       advance(body, batch, weights, local_a, local_v, update, velocity);
       deform_batch(body, batch, cell, x, weights, local_v, local_w, spin, update.dt,
-                   averaged ? &mean : nullptr, findings);
+                   averaged ? &mean : nullptr, pressure, increment, findings);
     }
     if (saturated && pressure.filter > 0.)
       filter_pressure(body, slice, pressure.filter);

@@ -11,7 +11,7 @@ class PointKernels : public Kernels<dim>
 {
 public:
   void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const PressureUpdate &pressure,
-               double *sums, const unsigned int stride) const override;
+               double *sums, const unsigned int stride, CellSums *cell_sums) const override;
   void advance_and_remap(Body<dim> &body, const ActiveNodes<dim> &nodes, const double *a, const double *v,
                          const char *spin_only, const VelocityUpdate &update,
                          double *momentum) const override;
@@ -103,7 +103,8 @@ private:
 
   template <bool affine>
   static void scatter_points(const Body<dim> &body, const ActiveNodes<dim> &nodes,
-                             const PressureUpdate &pressure, double *sums, const unsigned int stride);
+                             const PressureUpdate &pressure, double *sums, const unsigned int stride,
+                             CellSums *cell_sums);
 
   static void advance(const Body<dim> &body, const Batch<double> &batch, const Weights<dim, reach> &w,
                       const double (*a)[Chunks::n_nodes], const double (*v)[Chunks::n_nodes],
@@ -120,7 +121,8 @@ private:
                            const std::array<CellInterval, dim> &cell, const std::array<Lanes, dim> &x,
                            const Weights<dim, reach> &weights, const double (*v)[Chunks::n_nodes],
                            const double (*w)[Chunks::n_nodes], const bool spin_only, const double dt,
-                           const Divergences *cell_mean, StepFindings &findings);
+                           const Divergences *cell_mean, const PressureUpdate &pressure,
+                           const double *increment, StepFindings &findings);
 
   /// Volume-weighted means over the points of a cell, the same in all lanes.
   static Divergences mean_divergences(const Body<dim> &body, const Slice &slice,
@@ -131,6 +133,8 @@ private:
   static Lanes volumes(const Layout &layout, const Batch<Row> &batch);
   static Lanes divergence_of(const Weights<dim, reach> &weights, const double (*field)[Chunks::n_nodes]);
   static double mean_pressure(const Body<dim> &body, const Slice &slice);
+  /// Storage and last increment of a cell; the slopes are scattered.
+  static void sum_up(const Body<dim> &body, const Slice &slice, double last_step, CellSums &cell_sums);
 
   /// Places of the nodes that a cell's points reach, relative to the cell's lower corner.
   static void node_offsets(const std::array<CellInterval, dim> &cell, NodeLanes (*offset)[Chunks::n]);

@@ -89,6 +89,11 @@ public:
   /// and for the present ones.
   Lanes stable_step(Lanes porosity, Lanes M, Lanes h, Lanes speed, bool seepage_inertia) const;
 
+  /// The speed that limits the step of the explicit skeleton beside implicit pressures to h/c [m/s]:
+  ///   c = sqrt(M/(rho - alpha rho_f) / (1 - r M/(alpha^2 Q (1 - r)))) with the term rho_f a: c_hf, and more
+  ///   where the fluid is hardly stiff enough for the form to be well posed;  c_d without.
+  Lanes semi_implicit_speed(Lanes porosity, Lanes M, Lanes density, bool seepage_inertia) const;
+
 private:
   template <typename Number>
   Number density_of(const Number porosity) const

@@ -15,6 +15,7 @@ struct SchemeFields
   bool extent = false;
   bool velocity_gradient = false;
   bool surface_depth = false; ///< and `extent`; for contact
+  bool pressure_rate = false; ///< of saturated bodies
   /// Put Gauss points, so many per direction, into full cells instead of evenly spaced points; 0: no.
   unsigned int gauss_points = 0;
 };
@@ -50,6 +51,7 @@ struct Layout
   int displacement = -1;      ///< [m] since the start
   int stress = -1;            ///< effective Cauchy stress [Pa]
   int pressure = -1;          ///< pore pressure [Pa]; saturated bodies
+  int pressure_rate = -1;     ///< of the last step [Pa/s]; saturated bodies with implicit pressures
   int porosity = -1;          ///< [-]; saturated bodies under finite strain (constant otherwise)
   int extent = -1;            ///< half the edge lengths of the point's domain [m]; GIMP and contact
   bool wide_domains = false;  ///< domains reach nodes beyond the point's cell: GIMP

@@ -85,5 +85,6 @@ private:
   void check(const Section &root) const;
   void check_contacts() const;
   void set_fall_velocities();
+  void check_implicit_pressure(const Section &root) const;
 };
 } // namespace peat

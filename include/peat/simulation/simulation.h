@@ -72,6 +72,7 @@ private:
   void make_up_solver(typename UpSolver<dim>::Method method, double start);
   unsigned long unknowns_of_solver() const;
   void report_work() const;
+  void report_work(const PressureWork &work);
   void report(double time, bool everything);
   void write_summary() const;
   std::vector<typename Comparison<dim>::Result> compare_with_references() const;
@@ -95,6 +96,7 @@ private:
   std::unique_ptr<Balances<dim>> balances;
   std::unique_ptr<Outputs> outputs;
   StepRecord steps;
+  PressureWork pressure_work; ///< of explicit stages with implicit pressures
   double now = 0.;
   double planned_end = 0.;
   bool stopped = false;

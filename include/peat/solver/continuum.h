@@ -1,6 +1,7 @@
 #pragma once
 
 #include <peat/condition/nodal_fields.h>
+#include <peat/solver/implicit_pressure.h>
 #include <peat/solver/ledger.h>
 #include <peat/solver/scene.h>
 #include <peat/solver/scheme.h>
@@ -31,6 +32,8 @@ public:
   void solve_momentum();
   void constrain_motion(Ledger<dim> &book);
   void solve_darcy();
+  /// Implicit pressures: their increments, and what they do to motion and flux.
+  void solve_pressure();
   /// Velocities of the points; with modified-update-stress-last mapped back to the nodes: carrying_velocity().
   void advance_points();
   void deform_points();
@@ -44,6 +47,8 @@ public:
   bool is_saturated() const { return saturated; }
   const dealii::Tensor<1, dim> &gravity() const { return gravity_now; }
   const StepFindings &findings() const { return step_findings; }
+  /// Nullptr with explicit pressures and in dry continua.
+  const ImplicitPressure<dim> *implicit_pressure() const { return pressure.get(); }
 
   double mass(const std::size_t node) const { return nodal.sums[node * nodal.n_sums + Sums<dim>::mass]; }
   /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
@@ -62,6 +67,12 @@ private:
   double node_volume(std::size_t node) const;
   dealii::Tensor<1, dim> total_momentum() const;
   PressureUpdate pressure_update(std::size_t member) const;
+  void begin_implicit_pressure();
+  /// Increments of the pressure from the middle of a step on to its end. The first step begins at a full
+  /// level of time, and the middle is that of both ends.
+  double extrapolation() const { return last_dt > 0. ? 1.5 : 1.; }
+  void find_freedom();
+  void book_fluid(Ledger<dim> &book) const;
   const Surface<dim> &surface(const Condition<dim> &condition) const;
   Body<dim> &body(const std::size_t member) const { return *scene.bodies[members[member]]; }
   bool holds_body(const std::string &name) const;
@@ -89,5 +100,12 @@ private:
   std::vector<char> prescribed;
   dealii::Tensor<1, dim> gravity_now;
   StepFindings step_findings;
+
+  std::unique_ptr<ImplicitPressure<dim>> pressure;
+  std::vector<std::size_t> first_increment; ///< of the member's cells
+  NodeFreedom<dim> freedom;
+  bool constrains_flux = false; ///< a condition gives or closes the flux, beside the mesh's faces
+  double last_dt = 0.;          ///< of the step before; 0: there was none [s]
+  double last_outflow = 0., last_squeezed = 0.;
 };
 } // namespace peat

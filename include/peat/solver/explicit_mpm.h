@@ -26,6 +26,8 @@ public:
   double time() const override { return now; }
   void set_time(const double time) override { now = time; }
   double largest_speed() const;
+  /// Of this stage; all zero with explicit pressures.
+  PressureWork pressure_work() const;
   /// Of all bodies together.
   const ActiveNodes<dim> &nodes() const override;
   const NodalFields<dim> &fields() const override;

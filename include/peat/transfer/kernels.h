@@ -50,6 +50,32 @@ struct PressureUpdate
   /// Share by which each point's pressure goes towards the mean of its cell in this step; conserves sum V p /
   /// Q.
   double filter = 0.;
+
+  // Implicit pressures (theory.md): points carry the rate of the last step, which says what the pressure was
+  // in its middle.
+  double last_step = 0.;              ///< 0: there was none [s]
+  double reach = 1.5;                 ///< of the increment, from there to the end of this step
+  const double *increments = nullptr; ///< from middle to middle, by slice [Pa]; nullptr: explicit
+};
+
+/// What the points of cells add up to, for implicit pressures: slice by slice, one body after the other.
+struct CellSums
+{
+  /// Nodes that the points reach: entries [entry_begin[k], entry_begin[k + 1]).
+  std::vector<std::uint32_t> entry_begin = {0};
+  std::vector<std::uint32_t> entry_node;
+  std::vector<double> slopes;         ///< sum V grad N, [n_entries][dim] [m^(dim - 1)]
+  std::vector<double> storage;        ///< sum V / Q [m^dim / Pa]
+  std::vector<double> last_increment; ///< of the pressure from middle to middle of steps [Pa]
+
+  void clear()
+  {
+    entry_begin.resize(1);
+    entry_node.clear();
+    slopes.clear();
+    storage.clear();
+    last_increment.clear();
+  }
 };
 
 /// The visits of the points of a body in a step, cell by cell. Members differ by basis, and by whether there
@@ -71,8 +97,9 @@ public:
 
   /// Points to nodes: mass, momentum, internal force and, with pore fluid, the terms of Darcy's law. Points
   /// that keep the gradient C of their velocity bring v_p + C (x_I - x_p) to node I.
+  /// For implicit pressures the sums of cells are added at the end of `cell_sums`.
   virtual void scatter(const Body<dim> &body, const ActiveNodes<dim> &nodes, const PressureUpdate &pressure,
-                       double *sums, unsigned int stride) const = 0;
+                       double *sums, unsigned int stride, CellSums *cell_sums) const = 0;
 
   /// Points' velocities from the nodes' acceleration `a` and new velocity `v` (modified-update-stress-last:
   /// and their momentum back to the nodes, columns of `momentum`).

@@ -1,0 +1,433 @@
+#include <peat/solver/implicit_pressure.h>
+
+#include <peat/base/error.h>
+
+#include <deal.II/base/mpi.h>
+#include <deal.II/lac/trilinos_sparsity_pattern.h>
+
+#include <Teuchos_ParameterList.hpp>
+#include <ml_MultiLevelPreconditioner.h>
+
+#include <cmath>
+#include <sstream>
+
+namespace peat {
+namespace {
+/// With more iterations than these the diagonal alone is a poor preconditioner.
+constexpr unsigned int most_with_diagonal = 25;
+constexpr unsigned int most_iterations = 2000;
+/// Mid-step velocity: new velocity minus this times dt a.
+constexpr double half = 0.5;
+} // namespace
+
+template <int dim>
+ImplicitPressure<dim>::ImplicitPressure(const ActiveNodes<dim> &active, const double alpha,
+                                        const bool seepage_inertia, const double stabilisation,
+                                        const double tolerance)
+    : active(active), alpha(alpha), seepage_inertia(seepage_inertia), stabilisation(stabilisation),
+      tolerance(tolerance), communicator(active.grid().communicator())
+{}
+
+template <int dim>
+void ImplicitPressure<dim>::renumber(const std::vector<CellId> &cells)
+{
+  cell_of_unknown = cells;
+  const std::size_t n = cells.size();
+  dealii::types::global_dof_index mine = n, before = 0;
+  const int ierr = MPI_Exscan(&mine, &before, 1, DEAL_II_DOF_INDEX_MPI_TYPE, MPI_SUM, communicator);
+  AssertThrowMPI(ierr);
+  if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0)
+    before = 0;
+  dealii::IndexSet owned(dealii::Utilities::MPI::sum(mine, communicator));
+  owned.add_range(before, before + n);
+  for (Vector *vector : {&x, &change, &right_side, &diagonal, &r, &z, &direction, &image})
+    vector->reinit(owned, communicator);
+
+  corner.resize(n);
+  for (std::size_t k = 0; k < n; ++k)
+    for (unsigned int v = 0; v < n_corners; ++v)
+      corner[k][v] = active.cell_nodes(cells[k])[active.own_node(v)];
+
+  // Each node is told which unknowns are around it, by where their cells lie; and how many they are.
+  constexpr unsigned int columns = n_corners + 1;
+  std::vector<double> around(active.size() * columns, -1.), count(active.size(), 0.);
+  for (std::size_t k = 0; k < n; ++k)
+    for (unsigned int v = 0; v < n_corners; ++v) {
+      around[corner[k][v] * std::size_t(columns) + v] = before + k;
+      count[corner[k][v]] += 1.;
+    }
+  active.max_over_ranks(around.data(), columns);
+  active.sum_over_ranks(count.data(), 1);
+  unbroken.assign(active.size(), 0);
+  filling.assign(active.size(), 0.);
+  spacing.resize(active.size() * dim);
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    unsigned int n_cells = 0;
+    for (unsigned int v = 0; v < n_corners; ++v)
+      n_cells += around[i * columns + v] >= 0.;
+    unbroken[i] = n_cells == n_corners && count[i] == n_corners;
+    filling[i] = double(n_cells) / n_corners;
+    const auto lattice = active.grid().node_lattice(active.grid_node(i));
+    for (unsigned int d = 0; d < dim; ++d) {
+      const auto &planes = active.grid().planes(d);
+      const int last = planes.size() - 1, below = std::max(lattice[d] - 1, 0),
+                above = std::min(lattice[d] + 1, last);
+      spacing[i * dim + d] = (planes[above] - planes[below]) / (above - below);
+    }
+  }
+  neighbour.resize(n);
+  for (std::size_t k = 0; k < n; ++k)
+    for (unsigned int face = 0; face < 2 * dim; ++face) {
+      const unsigned int bit = 1u << (face / 2), v = face % 2 ? bit : 0;
+      neighbour[k][face] = around[corner[k][v] * std::size_t(columns) + (v ^ bit)];
+    }
+  multigrid.reset();
+}
+
+template <int dim>
+void ImplicitPressure<dim>::find_responses(const NodeFreedom<dim> &freedom, const NodalFields<dim> &nodal)
+{
+  using S = Sums<dim>;
+  const std::size_t n = active.size();
+  mobility.resize(n * dim);
+  conductance.resize(n * dim);
+  response.resize(n * dim);
+  mode_response.assign(n * n_modes, 0.);
+  q.resize(n * dim);
+  mode.resize(n * n_modes);
+  const double inertia = seepage_inertia ? 1. : 0.;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double *sum = &nodal.sums[i * nodal.n_sums];
+    const double flow = sum[S::resistance] > 0. ? weight / sum[S::resistance] : 0.;
+    for (unsigned int d = 0; d < dim; ++d) {
+      const std::size_t row = i * dim + d;
+      mobility[row] = sum[S::mass] > 0. && freedom.moves[row] ? weight * alpha / sum[S::mass] : 0.;
+      conductance[row] =
+          freedom.flows[row] ? flow * (1. - inertia * sum[S::fluid_inertia] * mobility[row] / weight) : 0.;
+      response[row] = dt * dt * half * alpha * mobility[row] + dt * conductance[row];
+    }
+  }
+  walls.clear();
+  for (const auto &[i, wall] : freedom.walls) {
+    // A wall that is tilted where only some components may move would make the flux's part unsymmetric.
+    dealii::Tensor<2, dim> free;
+    for (unsigned int d = 0; d < dim; ++d)
+      free[d][d] = conductance[std::size_t(i) * dim + d];
+    const auto squared = transpose(wall) * wall;
+    walls.emplace_back(i, 0.5 * (squared * free + free * squared));
+    for (unsigned int d = 0; d < dim; ++d) {
+      const std::size_t row = std::size_t(i) * dim + d;
+      conductance[row] = 0.;
+      response[row] = dt * dt * half * alpha * mobility[row];
+    }
+  }
+  if (stabilisation == 0.)
+    return;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!unbroken[i])
+      continue;
+    double volume = 1., along[dim];
+    for (unsigned int d = 0; d < dim; ++d) {
+      const double h = spacing[i * dim + d];
+      volume *= h;
+      along[d] = 4. * response[i * dim + d] / (h * h);
+    }
+    for (unsigned int m = 0; m < n_modes; ++m)
+      for (unsigned int d = 0; d < dim; ++d)
+        if (mode_directions[m] >> d & 1)
+          mode_response[i * n_modes + m] +=
+              stabilisation * along[d] * volume * volume / (n_corners * n_corners);
+  }
+}
+
+template <int dim>
+void ImplicitPressure<dim>::find_right_side(const dealii::Tensor<1, dim> &gravity,
+                                            const NodalFields<dim> &nodal)
+{
+  using S = Sums<dim>;
+  // What has to vanish at rest, and what its parts would be if none cancelled another.
+  std::vector<double> carry(active.size() * dim), gross(active.size() * dim);
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    const double *sum = &nodal.sums[i * nodal.n_sums];
+    const double flow = sum[S::resistance] > 0. ? 1. / sum[S::resistance] : 0.;
+    for (unsigned int d = 0; d < dim; ++d) {
+      const std::size_t row = i * dim + d;
+      carry[row] =
+          -dt * (alpha * (nodal.new_velocity[row] - half * dt * nodal.acceleration[row]) + nodal.flux[row]);
+      gross[row] = dt * (alpha * std::abs(nodal.new_velocity[row]) +
+                         flow * (std::abs(sum[S::pressure_force + d]) + std::abs(nodal.pressure_load[row]) +
+                                 sum[S::fluid_inertia] * std::abs(gravity[d])));
+    }
+  }
+  double sum_of_squares = 0.;
+  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
+    double sum = 0., parts = 0.;
+    for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e)
+      for (unsigned int d = 0; d < dim; ++d) {
+        sum += sums.slopes[e * std::size_t(dim) + d] * carry[sums.entry_node[e] * std::size_t(dim) + d];
+        parts += std::abs(sums.slopes[e * std::size_t(dim) + d]) * gross[sums.entry_node[e] * std::size_t(dim) + d];
+      }
+    right_side.local_element(k) = sum;
+    r.local_element(k) = sum - sums.storage[k] * sums.last_increment[k];
+    parts += sums.storage[k] * std::abs(sums.last_increment[k]);
+    sum_of_squares += parts * parts / diagonal.local_element(k);
+  }
+  std::copy(sums.last_increment.begin(), sums.last_increment.end(), x.begin());
+  add_stabilisation(x, -1., r);
+  constexpr double relative = 1e-15;
+  round_off = relative * std::sqrt(dealii::Utilities::MPI::sum(sum_of_squares, communicator));
+}
+
+template <int dim>
+void ImplicitPressure<dim>::to_nodes(const Vector &pressures) const
+{
+  std::fill(q.begin(), q.end(), 0.);
+  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
+    const double p = pressures.local_element(k);
+    for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e)
+      for (unsigned int d = 0; d < dim; ++d)
+        q[sums.entry_node[e] * std::size_t(dim) + d] += p * sums.slopes[e * std::size_t(dim) + d];
+  }
+  active.sum_over_ranks(q.data(), dim);
+}
+
+template <int dim>
+void ImplicitPressure<dim>::apply(const Vector &pressures, Vector &result) const
+{
+  to_nodes(pressures);
+  std::vector<dealii::Tensor<1, dim>> through_walls;
+  for (const auto &[i, tensor] : walls) {
+    dealii::Tensor<1, dim> force;
+    for (unsigned int d = 0; d < dim; ++d)
+      force[d] = q[std::size_t(i) * dim + d];
+    through_walls.push_back(dt * (tensor * force));
+  }
+  for (std::size_t row = 0; row < q.size(); ++row)
+    q[row] *= response[row];
+  for (std::size_t w = 0; w < walls.size(); ++w)
+    for (unsigned int d = 0; d < dim; ++d)
+      q[std::size_t(walls[w].first) * dim + d] += through_walls[w][d];
+
+  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
+    double sum = sums.storage[k] * pressures.local_element(k);
+    for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e)
+      for (unsigned int d = 0; d < dim; ++d)
+        sum += sums.slopes[e * std::size_t(dim) + d] * q[sums.entry_node[e] * std::size_t(dim) + d];
+    result.local_element(k) = sum;
+  }
+  add_stabilisation(pressures, 1., result);
+}
+
+template <int dim>
+void ImplicitPressure<dim>::add_stabilisation(const Vector &pressures, const double factor,
+                                              Vector &result) const
+{
+  if (stabilisation == 0.)
+    return;
+  std::fill(mode.begin(), mode.end(), 0.);
+  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
+    const double p = pressures.local_element(k);
+    for (unsigned int v = 0; v < n_corners; ++v)
+      for (unsigned int m = 0; m < n_modes; ++m)
+        mode[corner[k][v] * std::size_t(n_modes) + m] += is_negative(v, mode_directions[m]) ? -p : p;
+  }
+  active.sum_over_ranks(mode.data(), n_modes);
+  for (std::size_t row = 0; row < mode.size(); ++row)
+    mode[row] *= factor * mode_response[row];
+  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
+    double sum = 0.;
+    for (unsigned int v = 0; v < n_corners; ++v)
+      for (unsigned int m = 0; m < n_modes; ++m) {
+        const double value = mode[corner[k][v] * std::size_t(n_modes) + m];
+        sum += is_negative(v, mode_directions[m]) ? -value : value;
+      }
+    result.local_element(k) += sum;
+  }
+}
+
+template <int dim>
+void ImplicitPressure<dim>::find_diagonal()
+{
+  std::vector<std::uint32_t> wall_of_node(walls.empty() ? 0 : active.size(), no_index);
+  for (std::size_t w = 0; w < walls.size(); ++w)
+    wall_of_node[walls[w].first] = w;
+  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
+    double sum = sums.storage[k];
+    for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e) {
+      const std::size_t i = sums.entry_node[e];
+      const double *value = &sums.slopes[e * std::size_t(dim)];
+      for (unsigned int d = 0; d < dim; ++d)
+        sum += value[d] * value[d] * response[i * dim + d];
+      if (!walls.empty() && wall_of_node[i] != no_index)
+        for (unsigned int d = 0; d < dim; ++d)
+          for (unsigned int c = 0; c < dim; ++c)
+            sum += dt * value[d] * walls[wall_of_node[i]].second[d][c] * value[c];
+    }
+    for (unsigned int v = 0; v < n_corners; ++v)
+      for (unsigned int m = 0; m < n_modes; ++m)
+        sum += mode_response[corner[k][v] * std::size_t(n_modes) + m];
+    diagonal.local_element(k) = sum;
+  }
+}
+
+template <int dim>
+void ImplicitPressure<dim>::make_multigrid()
+{
+  // Full cells with the stabilisation have this operator; others nearly.
+  using S = dealii::types::global_dof_index;
+  const dealii::IndexSet &owned = x.locally_owned_elements();
+  dealii::TrilinosWrappers::SparsityPattern pattern(owned, owned, communicator, 2 * dim + 1);
+  const S first = sums.storage.empty() ? 0 : owned.nth_index_in_set(0);
+  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
+    pattern.add(first + k, first + k);
+    for (const double other : neighbour[k])
+      if (other >= 0.)
+        pattern.add(first + k, S(other));
+  }
+  pattern.compress();
+  star.reinit(pattern);
+  const Grid<dim> &grid = active.grid();
+  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
+    double own = sums.storage[k];
+    for (unsigned int face = 0; face < 2 * dim; ++face) {
+      const unsigned int d = face / 2;
+      double coupling = 0.;
+      for (unsigned int v = 0; v < n_corners; ++v)
+        if ((v >> d & 1) == face % 2) {
+          const std::size_t i = corner[k][v];
+          double volume = 1.;
+          for (unsigned int e = 0; e < dim; ++e)
+            volume *= spacing[i * dim + e];
+          coupling += response[i * dim + d] * volume * volume * filling[i];
+        }
+      const double h = grid.size(cell_of_unknown[k], d);
+      coupling *= 2. / n_corners / (h * h);
+      if (neighbour[k][face] >= 0.) {
+        star.set(first + k, S(neighbour[k][face]), -coupling);
+        own += coupling;
+      } else
+        own += 2. * coupling;
+    }
+    star.set(first + k, first + k, own);
+  }
+  star.compress(dealii::VectorOperation::insert);
+
+  Teuchos::ParameterList list;
+  ML_Epetra::SetDefaults("SA", list);
+  list.set("ML output", 0);
+  list.set("aggregation: type", "Uncoupled");
+  list.set("smoother: type", "Chebyshev");
+  list.set("smoother: sweeps", 2);
+  list.set("coarse: type", "Amesos-KLU");
+  list.set("coarse: max size", 1000);
+  multigrid = std::make_unique<dealii::TrilinosWrappers::PreconditionAMG>();
+  multigrid->initialize(star, list);
+  fresh_iterations = 0;
+  ++done.multigrids;
+}
+
+template <int dim>
+void ImplicitPressure<dim>::precondition(const Vector &residual, Vector &result) const
+{
+  if (multigrid)
+    multigrid->vmult(result, residual);
+  else
+    for (std::size_t k = 0; k < sums.storage.size(); ++k)
+      result.local_element(k) = residual.local_element(k) / diagonal.local_element(k);
+}
+
+template <int dim>
+unsigned int ImplicitPressure<dim>::iterate()
+{
+  const auto squared_norm = [&](const Vector &vector) {
+    double sum = 0.;
+    for (std::size_t k = 0; k < sums.storage.size(); ++k)
+      sum += vector.local_element(k) * vector.local_element(k) / diagonal.local_element(k);
+    return dealii::Utilities::MPI::sum(sum, communicator);
+  };
+  // What is looked for is the change of the increment.
+  const double size = std::sqrt(squared_norm(right_side));
+  const double target = std::max(tolerance * size, round_off);
+  change = 0.;
+  double rho_before = 0.;
+  for (unsigned int iteration = 0;; ++iteration) {
+    const double norm = std::sqrt(squared_norm(r));
+    if (norm <= target)
+      return iteration;
+    if (iteration >= most_iterations || !(norm < std::numeric_limits<double>::max())) {
+      std::ostringstream text;
+      text << "the pore pressure of an implicit step did not converge in " << iteration
+           << " iterations: residual " << norm / size << " of the right-hand side; use a smaller 'Step factor'";
+      throw NumericalError(text.str());
+    }
+    precondition(r, z);
+    const double rho = r * z;
+    direction.sadd(iteration > 0 ? rho / rho_before : 0., 1., z);
+    rho_before = rho;
+    apply(direction, image);
+    const double length = rho / (direction * image);
+    change.add(length, direction);
+    r.add(-length, image);
+  }
+}
+
+template <int dim>
+void ImplicitPressure<dim>::update(NodalFields<dim> &nodal)
+{
+  using S = Sums<dim>;
+  to_nodes(change);
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    double *sum = &nodal.sums[i * nodal.n_sums];
+    for (unsigned int d = 0; d < dim; ++d) {
+      const std::size_t row = i * dim + d;
+      sum[S::force + d] += weight * alpha * q[row];
+      sum[S::pressure_force + d] += weight * q[row];
+      const double change = mobility[row] * q[row];
+      nodal.acceleration[row] += change;
+      nodal.new_velocity[row] += dt * change;
+      nodal.flux[row] += conductance[row] * q[row];
+    }
+  }
+  for (const auto &[i, tensor] : walls)
+    for (unsigned int d = 0; d < dim; ++d)
+      for (unsigned int c = 0; c < dim; ++c)
+        nodal.flux[std::size_t(i) * dim + d] += tensor[d][c] * q[std::size_t(i) * dim + c];
+
+  outflow = squeezed = 0.;
+  for (std::size_t k = 0; k < sums.storage.size(); ++k)
+    for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e)
+      for (unsigned int d = 0; d < dim; ++d) {
+        const std::size_t row = sums.entry_node[e] * std::size_t(dim) + d;
+        const double value = dt * sums.slopes[e * std::size_t(dim) + d];
+        outflow += value * nodal.flux[row];
+        squeezed += value * alpha * (nodal.new_velocity[row] - half * dt * nodal.acceleration[row]);
+      }
+}
+
+template <int dim>
+void ImplicitPressure<dim>::solve(const NodeFreedom<dim> &freedom, const dealii::Tensor<1, dim> &gravity,
+                                  NodalFields<dim> &nodal)
+{
+  dt = nodal.dt;
+  find_responses(freedom, nodal);
+  find_diagonal();
+  find_right_side(gravity, nodal);
+  if (wants_multigrid && !multigrid)
+    make_multigrid();
+  const unsigned int n = iterate();
+  ++done.solves;
+  done.iterations += n;
+  if (!multigrid)
+    wants_multigrid = wants_multigrid || n > most_with_diagonal;
+  else if (fresh_iterations == 0)
+    fresh_iterations = n;
+  else if (n > 2 * fresh_iterations + 5)
+    multigrid.reset();
+  for (std::size_t k = 0; k < sums.storage.size(); ++k)
+    x.local_element(k) = sums.last_increment[k] + change.local_element(k);
+  update(nodal);
+}
+
+template class ImplicitPressure<2>;
+template class ImplicitPressure<3>;
+} // namespace peat

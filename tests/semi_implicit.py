@@ -1,0 +1,121 @@
+#!/usr/bin/env python3
+"""Run the scenes of prm/verification with implicit pore pressures beside the explicit skeleton.
+
+    semi_implicit.py --peat build/peat --case NAME [--ranks N] [--keep DIR]
+    semi_implicit.py --list quick|full
+
+Bounds are those of the scenes' parameter files, where they are explained; a bound that differs says why beside it.
+"""
+import sys
+
+import scenes
+
+IMPLICIT = {"Explicit MPM/Pore pressure": "implicit"}
+TABLE = "reference/data/D3_ramp_%sup.csv"
+PROFILES = "reference/data/D3_ramp_%sprofiles_up.csv"
+
+
+def ramp(conductivity, table, **constants):
+    settings = {"Constants/k": conductivity, "References/pressure/File": PROFILES % table}
+    for name in "pressure at the base", "displacement of the top":
+        settings["References/%s/File" % name] = TABLE % table
+    settings.update(("Constants/" + key, value) for key, value in constants.items())
+    return settings
+
+
+def d3(c):
+    # With k = 1e-6 m/s the drained layer is thinner than a cell for ever: nothing is said of the top.
+    for k, table in (1e-2, "permeable_"), (1e-3, ""), (1e-6, "tight_"):
+        sizes = (20, 40, 80)
+        runs = [c.run("D3_ramp", dict(IMPLICIT, **ramp(k, table, cells=n))) for n in sizes]
+        c.below("k = %g: pressure (rms over cells, all times)" % k, runs[-1].error("pressure", "L2"), 1e-2)
+        c.below("k = %g: pressure at the base, Linf" % k, runs[-1].error("pressure at the base", "Linf"), 1e-2)
+        if k > 1e-6:
+            c.below("k = %g: displacement of the top for t >= 0.1 s, Linf" % k,
+                    runs[-1].error("displacement of the top", "Linf"), 1e-2)
+            c.order("k = %g: pressure at 0.4 s" % k, sizes, [r.errors_at_times("pressure")[-1] for r in runs], 1.8)
+        # h/c_hf at 0.8, whatever the permeability; the explicit step needs 170,000, 17,000 and 7,000.
+        c.below("k = %g: steps" % k, runs[-1].summary["steps"], 1000)
+        c.below("k = %g: fluid mass" % k, runs[-1].summary["balance"]["fluid_mass"], 1e-12)
+        c.below("k = %g: momentum" % k, runs[-1].summary["balance"]["momentum"], 1e-12)
+
+
+def d3_3d(c):
+    """The third dimension must not take part, nor may the basis and the stress update matter much."""
+    short = {"References/pressure/Times": "0.03, 0.1, 0.2",
+             "References/pressure/Columns": "p(t=0.03 s) [Pa], p(t=0.1 s) [Pa], p(t=0.2 s) [Pa]", "Constants/End": 0.2}
+    flat = c.run("D3_ramp", dict(IMPLICIT, **{"Constants/cells": 20}, **short))
+    run = c.run("D3_ramp_3d", IMPLICIT)
+    for a, b, t in zip(run.errors_at_times("pressure"), flat.errors_at_times("pressure"), (0.03, 0.1, 0.2)):
+        c.below("error of the pressure at %g s against 2-D" % t, abs(a / b - 1.), 1e-6)
+    for update in "usl", "musl":
+        run = c.run("D3_ramp_3d", dict(IMPLICIT, **{"Explicit MPM/Basis": "q1", "Explicit MPM/Stress update": update}))
+        c.below("q1, %s: pressure at the base, Linf" % update, run.error("pressure at the base", "Linf"), 2e-2)
+
+
+def d5(c):
+    """Order in time, of a wave that steps resolve: differences between runs with halved steps on one mesh."""
+    for form in "true", "false":
+        runs = [c.run("D5_standing_wave", dict(IMPLICIT, **{
+            "Explicit MPM/Time step": "End/%d" % n, "Output/Probe interval": "End/600", "Seepage inertia": form}))
+                for n in (600, 1200, 2400, 4800)]
+        pressures = [r.table("probes.csv")["base/pressure"] for r in runs]
+        scale = max(abs(p) for p in pressures[-1])
+        differences = [max(abs(a - b) for a, b in zip(p, q)) / scale for p, q in zip(pressures, pressures[1:])]
+        c.order("seepage inertia %s: pressure, steps" % form, (1, 2, 4), differences, 1.7)
+        c.below("difference to the explicit scheme", explicit_difference(c, pressures[-1], scale, form), 1e-2)
+
+
+def explicit_difference(c, pressures, scale, form):
+    run = c.run("D5_standing_wave", {"Explicit MPM/Step factor": 0.1, "Output/Probe interval": "End/600",
+                                     "Seepage inertia": form})
+    return max(abs(a - b) for a, b in zip(run.table("probes.csv")["base/pressure"], pressures)) / scale
+
+
+def p1(c):
+    sizes = (10, 20, 40)
+    runs = [c.run("P1_terzaghi", dict(IMPLICIT, **{"Constants/cells": n})) for n in sizes]
+    c.below("pressure (rms over cells, all times)", runs[-1].error("pressure", "L2"), 3e-3)
+    c.below("settlement, Linf", runs[-1].error("settlement", "Linf"), 5e-3)
+    for i, T in ((1, 0.1), (2, 0.2)):
+        c.order("pressure at T = %g" % T, sizes, [r.errors_at_times("pressure")[i] for r in runs], 1.8)
+
+
+def rest(c):
+    run = c.run("P2_selfweight_consolidation", dict(IMPLICIT, **{
+        "Constants/H": 1, "Constants/cells": 10, "Constants/K_f": 2.2e8, "Constants/g": 1e-3, "Constants/End": "7*t_1"}))
+    c.below("pressure in the end, hydrostatic", run.error("hydrostatic", "Linf"), 1e-6)
+    for offset in (0, 0.37):
+        run = c.run("G1_rest", dict(IMPLICIT, **{"Constants/offset": offset}))
+        c.below("offset %g: displacement over height" % offset, run.error("displacement", "Linf"), 1e-6)
+        c.below("offset %g: pressure" % offset, run.error("pressure", "Linf"), 1e-6)
+    for scene in "G1_static", "G2_layered_slope":
+        run = c.run(scene, IMPLICIT)
+        speed = max(run.table("statistics.csv")["largest speed"])
+        c.below(scene + ": largest speed over c_u", speed / 1664.5, 1e-15)
+
+
+def parallel_pressure(c):
+    tight = dict(IMPLICIT, **{"Explicit MPM/Pressure tolerance": 1e-14})
+    cases = {"D3_ramp": dict(tight, **ramp(1e-2, "permeable_", cells=40)), "D6_strip_pulse": dict(tight, **{"Method": "mpm", "Constants/cells": 2})}
+    for scene, settings in cases.items():
+        runs = [c.run(scene, settings, ranks=n) for n in (1, 2, 3)]
+        for n, run in zip((2, 3), runs[1:]):
+            for table in "statistics.csv", "probes.csv":
+                difference, column = scenes.compare_tables(runs[0].directory + "/" + table, run.directory + "/" + table)
+                c.below("%s, %d ranks, %s (%s)" % (scene, n, table[:-4], column), difference, 1e-10)
+
+
+# name: (function, labels, seconds on one core)
+CASES = {
+    "semi_D3": (d3, ("quick", "full"), 3),
+    "semi_D3_3d": (d3_3d, ("quick", "full"), 2),
+    "semi_D5": (d5, ("full",), 5),
+    "semi_P1": (p1, ("full",), 5),
+    "semi_rest": (rest, ("quick", "full"), 5),
+    "parallel_pressure": (parallel_pressure, ("full",), 20),
+}
+
+if __name__ == "__main__":
+    scenes.CASES = CASES
+    sys.exit(scenes.main())
