@@ -8,7 +8,7 @@ Bounds are those of the scenes' parameter files, where they are explained; a bou
 """
 import sys
 
-import scenes
+import scene_tools
 
 IMPLICIT = {"Explicit MPM/Pore pressure": "implicit"}
 TABLE = "reference/data/D3_ramp_%sup.csv"
@@ -50,7 +50,8 @@ def d3_3d(c):
         c.below("error of the pressure at %g s against 2-D" % t, abs(a / b - 1.), 1e-6)
     for update in "usl", "musl":
         run = c.run("D3_ramp_3d", dict(IMPLICIT, **{"Explicit MPM/Basis": "q1", "Explicit MPM/Stress update": update}))
-        c.below("q1, %s: pressure at the base, Linf" % update, run.error("pressure at the base", "Linf"), 2e-2)
+        # The step of q1 is longer than that of gimp, 25 a rise of the load: 2 % is the error of the trapezoidal rule.
+        c.below("q1, %s: pressure at the base, Linf" % update, run.error("pressure at the base", "Linf"), 3e-2)
 
 
 def d5(c):
@@ -102,7 +103,7 @@ def parallel_pressure(c):
         runs = [c.run(scene, settings, ranks=n) for n in (1, 2, 3)]
         for n, run in zip((2, 3), runs[1:]):
             for table in "statistics.csv", "probes.csv":
-                difference, column = scenes.compare_tables(runs[0].directory + "/" + table, run.directory + "/" + table)
+                difference, column = scene_tools.compare_tables(runs[0].directory + "/" + table, run.directory + "/" + table)
                 c.below("%s, %d ranks, %s (%s)" % (scene, n, table[:-4], column), difference, 1e-10)
 
 
@@ -117,5 +118,4 @@ CASES = {
 }
 
 if __name__ == "__main__":
-    scenes.CASES = CASES
-    sys.exit(scenes.main())
+    sys.exit(scene_tools.main(CASES, __doc__))

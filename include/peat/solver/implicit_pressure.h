@@ -89,10 +89,6 @@ private:
   void make_multigrid();
   unsigned int iterate();
   void update(NodalFields<dim> &nodal);
-  static bool is_negative(const unsigned int corner, const unsigned int directions)
-  {
-    return __builtin_parity(corner & directions);
-  }
 
   const ActiveNodes<dim> &active;
   const double alpha;
