@@ -165,7 +165,8 @@ void ImplicitPressure<dim>::find_right_side(const dealii::Tensor<1, dim> &gravit
     for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e)
       for (unsigned int d = 0; d < dim; ++d) {
         sum += sums.slopes[e * std::size_t(dim) + d] * carry[sums.entry_node[e] * std::size_t(dim) + d];
-        parts += std::abs(sums.slopes[e * std::size_t(dim) + d]) * gross[sums.entry_node[e] * std::size_t(dim) + d];
+        parts += std::abs(sums.slopes[e * std::size_t(dim) + d]) *
+                 gross[sums.entry_node[e] * std::size_t(dim) + d];
       }
     right_side.local_element(k) = sum;
     r.local_element(k) = sum - sums.storage[k] * sums.last_increment[k];
@@ -376,7 +377,8 @@ unsigned int ImplicitPressure<dim>::iterate()
     if (iteration >= most_iterations || !(norm < std::numeric_limits<double>::max())) {
       std::ostringstream text;
       text << "the pore pressure of an implicit step did not converge in " << iteration
-           << " iterations: residual " << norm / size << " of the right-hand side; use a smaller 'Step factor'";
+           << " iterations: residual " << norm / size
+           << " of the right-hand side; use a smaller 'Step factor'";
       throw NumericalError(text.str());
     }
     precondition(r, z);
