@@ -96,6 +96,18 @@ def rest(c):
         c.below(scene + ": largest speed over c_u", speed / 1664.5, 1e-15)
 
 
+def limit(c):
+    """In permeable soil the largest step is h/c_hf; the automatic one also allows for slivers, by a factor of sqrt(2)."""
+    for share, stable in (0.97, True), (1.04, False):
+        run = c.run("N1_timestep", dict(IMPLICIT, **{
+            "Constants/k": 1e-2, "Constants/End": 3, "Output/Statistics interval": 3,
+            "Explicit MPM/Step factor": share * 2.**0.5}), may_fail=True)
+        speed = run.table("statistics.csv")["largest speed"]
+        # It begins with 1e-6 m/s, and is damped.
+        c.note("step %g h/c_hf is %s" % (share, "stable" if stable else "unstable"), (speed[-1] < 1e-6) == stable,
+               "speed in the end %.3g m/s" % speed[-1])
+
+
 def parallel_pressure(c):
     tight = dict(IMPLICIT, **{"Explicit MPM/Pressure tolerance": 1e-14})
     cases = {"D3_ramp": dict(tight, **ramp(1e-2, "permeable_", cells=40)), "D6_strip_pulse": dict(tight, **{"Method": "mpm", "Constants/cells": 2})}
@@ -113,6 +125,7 @@ CASES = {
     "semi_D3_3d": (d3_3d, ("quick", "full"), 2),
     "semi_D5": (d5, ("full",), 5),
     "semi_P1": (p1, ("full",), 5),
+    "semi_limit": (limit, ("quick", "full"), 2),
     "semi_rest": (rest, ("quick", "full"), 5),
     "parallel_pressure": (parallel_pressure, ("full",), 20),
 }
