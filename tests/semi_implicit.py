@@ -8,7 +8,7 @@ Bounds are those of the scenes' parameter files, where they are explained; a bou
 """
 import sys
 
-import scenes
+import scene_tools
 
 IMPLICIT = {"Explicit MPM/Pore pressure": "implicit"}
 TABLE = "reference/data/D3_ramp_%sup.csv"
@@ -50,7 +50,8 @@ def d3_3d(c):
         c.below("error of the pressure at %g s against 2-D" % t, abs(a / b - 1.), 1e-6)
     for update in "usl", "musl":
         run = c.run("D3_ramp_3d", dict(IMPLICIT, **{"Explicit MPM/Basis": "q1", "Explicit MPM/Stress update": update}))
-        c.below("q1, %s: pressure at the base, Linf" % update, run.error("pressure at the base", "Linf"), 2e-2)
+        # The step of q1 is longer than that of gimp, 25 a rise of the load: 2 % is the error of the trapezoidal rule.
+        c.below("q1, %s: pressure at the base, Linf" % update, run.error("pressure at the base", "Linf"), 3e-2)
 
 
 def d5(c):
@@ -95,6 +96,18 @@ def rest(c):
         c.below(scene + ": largest speed over c_u", speed / 1664.5, 1e-15)
 
 
+def limit(c):
+    """In permeable soil the largest step is h/c_hf; the automatic one also allows for slivers, by a factor of sqrt(2)."""
+    for share, stable in (0.97, True), (1.04, False):
+        run = c.run("N1_timestep", dict(IMPLICIT, **{
+            "Constants/k": 1e-2, "Constants/End": 3, "Output/Statistics interval": 3,
+            "Explicit MPM/Step factor": share * 2.**0.5}), may_fail=True)
+        speed = run.table("statistics.csv")["largest speed"]
+        # It begins with 1e-6 m/s, and is damped.
+        c.note("step %g h/c_hf is %s" % (share, "stable" if stable else "unstable"), (speed[-1] < 1e-6) == stable,
+               "speed in the end %.3g m/s" % speed[-1])
+
+
 def parallel_pressure(c):
     tight = dict(IMPLICIT, **{"Explicit MPM/Pressure tolerance": 1e-14})
     cases = {"D3_ramp": dict(tight, **ramp(1e-2, "permeable_", cells=40)), "D6_strip_pulse": dict(tight, **{"Method": "mpm", "Constants/cells": 2})}
@@ -102,7 +115,7 @@ def parallel_pressure(c):
         runs = [c.run(scene, settings, ranks=n) for n in (1, 2, 3)]
         for n, run in zip((2, 3), runs[1:]):
             for table in "statistics.csv", "probes.csv":
-                difference, column = scenes.compare_tables(runs[0].directory + "/" + table, run.directory + "/" + table)
+                difference, column = scene_tools.compare_tables(runs[0].directory + "/" + table, run.directory + "/" + table)
                 c.below("%s, %d ranks, %s (%s)" % (scene, n, table[:-4], column), difference, 1e-10)
 
 
@@ -112,10 +125,10 @@ CASES = {
     "semi_D3_3d": (d3_3d, ("quick", "full"), 2),
     "semi_D5": (d5, ("full",), 5),
     "semi_P1": (p1, ("full",), 5),
+    "semi_limit": (limit, ("quick", "full"), 2),
     "semi_rest": (rest, ("quick", "full"), 5),
     "parallel_pressure": (parallel_pressure, ("full",), 20),
 }
 
 if __name__ == "__main__":
-    scenes.CASES = CASES
-    sys.exit(scenes.main())
+    sys.exit(scene_tools.main(CASES, __doc__))

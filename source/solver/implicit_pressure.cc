@@ -165,7 +165,8 @@ void ImplicitPressure<dim>::find_right_side(const dealii::Tensor<1, dim> &gravit
     for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e)
       for (unsigned int d = 0; d < dim; ++d) {
         sum += sums.slopes[e * std::size_t(dim) + d] * carry[sums.entry_node[e] * std::size_t(dim) + d];
-        parts += std::abs(sums.slopes[e * std::size_t(dim) + d]) * gross[sums.entry_node[e] * std::size_t(dim) + d];
+        parts += std::abs(sums.slopes[e * std::size_t(dim) + d]) *
+                 gross[sums.entry_node[e] * std::size_t(dim) + d];
       }
     right_side.local_element(k) = sum;
     r.local_element(k) = sum - sums.storage[k] * sums.last_increment[k];
@@ -182,11 +183,15 @@ template <int dim>
 void ImplicitPressure<dim>::to_nodes(const Vector &pressures) const
 {
   std::fill(q.begin(), q.end(), 0.);
+  const std::uint32_t *node = sums.entry_node.data();
+  const double *slope = sums.slopes.data();
   for (std::size_t k = 0; k < sums.storage.size(); ++k) {
     const double p = pressures.local_element(k);
-    for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e)
+    for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e, ++node, slope += dim) {
+      double *at_node = &q[*node * std::size_t(dim)];
       for (unsigned int d = 0; d < dim; ++d)
-        q[sums.entry_node[e] * std::size_t(dim) + d] += p * sums.slopes[e * std::size_t(dim) + d];
+        at_node[d] += p * slope[d];
+    }
   }
   active.sum_over_ranks(q.data(), dim);
 }
@@ -208,12 +213,19 @@ void ImplicitPressure<dim>::apply(const Vector &pressures, Vector &result) const
     for (unsigned int d = 0; d < dim; ++d)
       q[std::size_t(walls[w].first) * dim + d] += through_walls[w][d];
 
+  const std::uint32_t *node = sums.entry_node.data();
+  const double *slope = sums.slopes.data();
   for (std::size_t k = 0; k < sums.storage.size(); ++k) {
-    double sum = sums.storage[k] * pressures.local_element(k);
-    for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e)
+    double sum[dim] = {};
+    for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e, ++node, slope += dim) {
+      const double *at_node = &q[*node * std::size_t(dim)];
       for (unsigned int d = 0; d < dim; ++d)
-        sum += sums.slopes[e * std::size_t(dim) + d] * q[sums.entry_node[e] * std::size_t(dim) + d];
-    result.local_element(k) = sum;
+        sum[d] += slope[d] * at_node[d];
+    }
+    double total = sums.storage[k] * pressures.local_element(k);
+    for (unsigned int d = 0; d < dim; ++d)
+      total += sum[d];
+    result.local_element(k) = total;
   }
   add_stabilisation(pressures, 1., result);
 }
@@ -224,24 +236,32 @@ void ImplicitPressure<dim>::add_stabilisation(const Vector &pressures, const dou
 {
   if (stabilisation == 0.)
     return;
+  // One sign for each corner of a cell and each mode.
+  alignas(32) double sign[n_corners][n_modes];
+  for (unsigned int v = 0; v < n_corners; ++v)
+    for (unsigned int m = 0; m < n_modes; ++m)
+      sign[v][m] = __builtin_parity(v & mode_directions[m]) ? -1. : 1.;
   std::fill(mode.begin(), mode.end(), 0.);
-  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
+  for (std::size_t k = 0; k < corner.size(); ++k) {
     const double p = pressures.local_element(k);
-    for (unsigned int v = 0; v < n_corners; ++v)
+    for (unsigned int v = 0; v < n_corners; ++v) {
+      double *at_node = &mode[corner[k][v] * std::size_t(n_modes)];
       for (unsigned int m = 0; m < n_modes; ++m)
-        mode[corner[k][v] * std::size_t(n_modes) + m] += is_negative(v, mode_directions[m]) ? -p : p;
+        at_node[m] += sign[v][m] * p;
+    }
   }
   active.sum_over_ranks(mode.data(), n_modes);
   for (std::size_t row = 0; row < mode.size(); ++row)
     mode[row] *= factor * mode_response[row];
-  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
-    double sum = 0.;
-    for (unsigned int v = 0; v < n_corners; ++v)
-      for (unsigned int m = 0; m < n_modes; ++m) {
-        const double value = mode[corner[k][v] * std::size_t(n_modes) + m];
-        sum += is_negative(v, mode_directions[m]) ? -value : value;
-      }
-    result.local_element(k) += sum;
+  for (std::size_t k = 0; k < corner.size(); ++k) {
+    double sum[n_modes] = {};
+    for (unsigned int v = 0; v < n_corners; ++v) {
+      const double *at_node = &mode[corner[k][v] * std::size_t(n_modes)];
+      for (unsigned int m = 0; m < n_modes; ++m)
+        sum[m] += sign[v][m] * at_node[m];
+    }
+    for (unsigned int m = 0; m < n_modes; ++m)
+      result.local_element(k) += sum[m];
   }
 }
 
@@ -357,7 +377,8 @@ unsigned int ImplicitPressure<dim>::iterate()
     if (iteration >= most_iterations || !(norm < std::numeric_limits<double>::max())) {
       std::ostringstream text;
       text << "the pore pressure of an implicit step did not converge in " << iteration
-           << " iterations: residual " << norm / size << " of the right-hand side; use a smaller 'Step factor'";
+           << " iterations: residual " << norm / size
+           << " of the right-hand side; use a smaller 'Step factor'";
       throw NumericalError(text.str());
     }
     precondition(r, z);

@@ -35,9 +35,10 @@ struct NodeFreedom
 ///
 ///   (S + B^T G B + C) Y = - dt B^T (alpha v_m + w) - (S + C) X_last,   B = sum V grad N,  S = sum V/Q,
 ///
-/// where v_m and w are mid-step velocity and flux as an explicit step would have them, and C is the stabilisation
-/// (theory.md, implicit pore pressure). Symmetric and positive definite; solved by conjugate gradients, with the diagonal, or with
-/// algebraic multigrid on a star of 2 dim + 1 points, as preconditioner.
+/// where v_m and w are mid-step velocity and flux as an explicit step would have them, and C is the
+/// stabilisation (theory.md, implicit pore pressure). Symmetric and positive definite; solved by conjugate
+/// gradients, with the diagonal, or with algebraic multigrid on a star of 2 dim + 1 points, as
+/// preconditioner.
 ///
 /// Collective: all functions that a step calls.
 template <int dim>
@@ -89,10 +90,6 @@ private:
   void make_multigrid();
   unsigned int iterate();
   void update(NodalFields<dim> &nodal);
-  static bool is_negative(const unsigned int corner, const unsigned int directions)
-  {
-    return __builtin_parity(corner & directions);
-  }
 
   const ActiveNodes<dim> &active;
   const double alpha;
@@ -111,10 +108,10 @@ private:
 
   // How nodes answer to q = B X, rows with dim columns.
   double dt = 0.;
-  std::vector<double> mobility;            ///< of the acceleration: weight alpha / m
-  std::vector<double> conductance;         ///< of the flux
-  std::vector<double> response;            ///< G
-  std::vector<double> mode_response;       ///< of alternating pressures, n_modes columns
+  std::vector<double> mobility;      ///< of the acceleration: weight alpha / m
+  std::vector<double> conductance;   ///< of the flux
+  std::vector<double> response;      ///< G
+  std::vector<double> mode_response; ///< of alternating pressures, n_modes columns
   std::vector<std::pair<std::uint32_t, dealii::Tensor<2, dim>>> walls; ///< conductances there
   mutable std::vector<double> q, mode;
 

@@ -38,7 +38,7 @@ struct SchemeParameters
   bool pressure_of_cells = true; ///< pore pressure acts with its mean over the points of a cell
   bool implicit_pressure = false; ///< pore pressures of a step follow from a linear system
   double pressure_stabilisation = 1.; ///< factor on the term on alternating pressures; implicit pressures
-  double pressure_tolerance = 1e-9;   ///< of the linear system; implicit pressures
+  double pressure_tolerance = 1e-6;   ///< of the linear system; implicit pressures
   double pressure_filter = 0.;   ///< rate of the filter in units of c_u / h
   double step_factor = 0.8;      ///< step over stable step
   double fixed_step = 0.;        ///< [s]; 0: automatic
