@@ -589,47 +589,6 @@ void UpSolver<dim>::relocate_points()
     matrix_is_valid = false;
 }
 
-namespace {
-/// Applies an action to the rows of all points of scenes.
-template <int dim, typename Action>
-void for_each_point(const std::vector<Scene<dim> *> &scenes, const Action &action)
-{
-  for (Scene<dim> *scene : scenes)
-    for (const auto &body : scene->bodies)
-      for (const std::uint32_t handle : body->handles())
-        action(body->layout(), body->row(handle));
-}
-} // namespace
-
-template <int dim>
-void UpSolver<dim>::set_horizontal_stress(const double K0)
-{
-  std::vector<Scene<dim> *> scenes = followers;
-  scenes.push_back(&scene);
-  for_each_point<dim>(scenes, [&](const Layout &layout, double *row) {
-    double *stress = row + layout.stress;
-    for (unsigned int d = 0; d < 3; ++d)
-      if (d != dim - 1)
-        stress[d] = K0 * stress[dim - 1];
-    for (unsigned int c = 3; c < (dim == 2 ? 4 : 6); ++c)
-      stress[c] = 0.;
-  });
-}
-
-template <int dim>
-void UpSolver<dim>::reset_displacements()
-{
-  std::vector<Scene<dim> *> scenes = followers;
-  scenes.push_back(&scene);
-  for_each_point<dim>(
-      scenes, [&](const Layout &layout, double *row) { std::fill_n(row + layout.displacement, dim, 0.); });
-  for (auto &[name, tracers] : scene.surfaces)
-    tracers.restart();
-  if (scene.probes)
-    scene.probes->restart();
-  total = 0.;
-}
-
 template class UpSolver<2>;
 template class UpSolver<3>;
 } // namespace peat
