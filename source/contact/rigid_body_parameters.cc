@@ -78,8 +78,8 @@ RigidBodyParameters<dim>::RigidBodyParameters(Section section) : section(section
   check_shape(section, name, *shape);
   prescribed = motion == "prescribed";
   const std::vector<std::string> of_free = {
-      "Density", "Mass", "Moment of inertia", "Free components", "Initial velocity",
-      "Initial spin", "Fall height"};
+      "Density",          "Mass",         "Moment of inertia", "Free components",
+      "Initial velocity", "Initial spin", "Fall height"};
   const std::vector<std::string> of_prescribed = {"Velocity", "Displacement", "Spin"};
   for (const std::string &key : prescribed ? of_free : of_prescribed)
     if (section.has(key))

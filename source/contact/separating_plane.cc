@@ -66,8 +66,8 @@ bool SeparatingPlanes<dim>::improve()
     if (change.norm() > limit)
       change *= limit / change.norm();
     plane += change;
-    converged = converged &&
-                (plane.template head<dim>().normalized() - before.template head<dim>()).norm() < still;
+    converged =
+        converged && (plane.template head<dim>().normalized() - before.template head<dim>()).norm() < still;
   }
   return converged;
 }

@@ -45,8 +45,9 @@ BodyParameters<dim>::BodyParameters(Section section, const std::vector<std::stri
 template <int dim>
 Body<dim>::Body(const BodyParameters<dim> &parameters, const Material &material, const Grid<dim> &grid,
                 const SchemeFields &scheme)
-    : parameters(parameters), gauss_points(scheme.gauss_points), body_material(material), grid(grid), columns(dim, material, scheme),
-      initial_shape(parameters.shape), particles(grid.triangulation(), grid.mapping(), columns.n_columns),
+    : parameters(parameters), gauss_points(scheme.gauss_points), body_material(material), grid(grid),
+      columns(dim, material, scheme), initial_shape(parameters.shape),
+      particles(grid.triangulation(), grid.mapping(), columns.n_columns),
       count_in_cell(grid.n_local_cells(), 0)
 {
   enter();
@@ -340,8 +341,8 @@ typename Body<dim>::Relocation Body<dim>::relocate(const double time)
     return result;
   const auto complain = [&](const std::uint32_t handle, const std::string &what) {
     std::ostringstream message;
-    message << "point " << id(handle) << " of body '" << name() << "' " << what << " at ("
-            << position(handle) << "), t = " << time << " s";
+    message << "point " << id(handle) << " of body '" << name() << "' " << what << " at (" << position(handle)
+            << "), t = " << time << " s";
     throw NumericalError(message.str());
   };
   for (const std::uint32_t handle : moved_points) {

@@ -245,13 +245,15 @@ void Case<dim>::check_contacts() const
 {
   for (const auto &contact : contacts)
     if (method == Method::fem && !contact.law->ties())
-      throw InputError(contact.origin, "finite elements tie bodies where they meet, and have no other contact; "
-                                       "set 'Law = tied', or 'Method = mpm'");
+      throw InputError(contact.origin,
+                       "finite elements tie bodies where they meet, and have no other contact; "
+                       "set 'Law = tied', or 'Method = mpm'");
   for (const auto &contact : contacts)
     for (const auto &body : bodies)
       if ((contact.first == body.name || contact.second == body.name) && !body.shape->is_distance())
-        throw InputError(contact.origin, "contact '" + contact.name + "' needs to know where the surface of '" +
-                                             body.name + "' is, which the shape 'inside' does not tell");
+        throw InputError(contact.origin, "contact '" + contact.name +
+                                             "' needs to know where the surface of '" + body.name +
+                                             "' is, which the shape 'inside' does not tell");
   for (const auto &body : bodies) {
     if (body.from_stage.empty())
       continue;

@@ -262,7 +262,7 @@ template <int dim>
 void check_fixed_step(const Case<dim> &parameters, const Scene<dim> &scene, const Grid<dim> &grid)
 {
   const StableStep stable = stable_step<dim>(scene.bodies, grid, parameters.scheme.seepage_inertia,
-                                              parameters.scheme.implicit_pressure);
+                                             parameters.scheme.implicit_pressure);
   if (parameters.scheme.fixed_step <= stable.dt)
     return;
   std::ostringstream message;

@@ -80,7 +80,8 @@ Statistics<dim>::Statistics(const std::string &directory, const Scene<dim> &scen
   file.precision(15);
   file << "time [s],step,dt [s],binding limit,mass [kg],kinetic energy [J],elastic energy [J],fluid energy "
           "[J],"
-          "external work [J],gravity work [J],seepage dissipation [J],contact dissipation [J],numerical dissipation [J],fluid "
+          "external work [J],gravity work [J],seepage dissipation [J],contact dissipation [J],numerical "
+          "dissipation [J],fluid "
           "outflow [m^"
        << dim << "],largest speed [m/s]";
   const char axes[] = "xyz";
@@ -108,7 +109,8 @@ void Statistics<dim>::write(const double time, const unsigned long step, const d
   file << time << ',' << step << ',' << dt << ',' << limit << ',' << totals.mass << ','
        << totals.kinetic_energy << ',' << totals.elastic_energy << ',' << totals.fluid_energy << ','
        << book.external_work << ',' << book.gravity_work << ',' << book.seepage_dissipation << ','
-       << book.contact_dissipation << ',' << balances.numerical_dissipation << ',' << book.fluid_outflow << ',' << totals.largest_speed;
+       << book.contact_dissipation << ',' << balances.numerical_dissipation << ',' << book.fluid_outflow
+       << ',' << totals.largest_speed;
   for (const auto &vector : {totals.momentum, book.impulse, totals.center})
     for (unsigned int d = 0; d < dim; ++d)
       file << ',' << vector[d];

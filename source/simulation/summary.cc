@@ -45,8 +45,9 @@ void Simulation<dim>::write_summary() const
   summary["case"] = parameters.title.empty() ? options.file : parameters.title;
   const bool fem = parameters.method == Method::fem;
   summary["method"] = fem ? "fem" : "mpm";
-  summary["scheme"] = unknowns_of_solver() > 0 ? "implicit" :
-                      pressure_work.solves > 0 ? "semi-implicit" : "explicit";
+  summary["scheme"] = unknowns_of_solver() > 0   ? "implicit"
+                      : pressure_work.solves > 0 ? "semi-implicit"
+                                                 : "explicit";
   summary["dimension"] = dim;
   summary["ranks"] = n_ranks;
   summary["completed"] = !stopped && now >= planned_end;

@@ -74,8 +74,7 @@ void BodyContact<dim>::add_over_ranks(std::vector<double> &values, const unsigne
                                       const Continuum<dim> &side) const
 {
   if (parallel)
-    over_ranks(values, n_columns, side,
-               [&](double *data) { side.nodes().sum_over_ranks(data, n_columns); });
+    over_ranks(values, n_columns, side, [&](double *data) { side.nodes().sum_over_ranks(data, n_columns); });
 }
 
 template <int dim>
@@ -112,8 +111,7 @@ void BodyContact<dim>::find_normals()
     gradient.assign(sites.size() * dim, 0.);
     for (const auto &entry : near[side].entries())
       for (unsigned int d = 0; d < dim; ++d)
-        gradient[std::size_t(entry.site) * dim + d] +=
-            near[side].points()[entry.point].volume * entry.dN[d];
+        gradient[std::size_t(entry.site) * dim + d] += near[side].points()[entry.point].volume * entry.dN[d];
     add_over_ranks(gradient, dim, continuum(side));
   }
   const Normal method = this->parameters.normal;
@@ -130,7 +128,7 @@ void BodyContact<dim>::find_normals()
       for (unsigned int d = 0; d < dim; ++d)
         g[side][d] = volume_gradient[side][s * dim + d];
     // sum V grad N points out of a body.
-    Vector n = method == Normal::prescribed ? this->parameters.direction
+    Vector n = method == Normal::prescribed   ? this->parameters.direction
                : method == Normal::regression ? planes.normal(s)
                                               : g[0] - g[1];
     n = n.norm() > 0. ? n / n.norm() : n;

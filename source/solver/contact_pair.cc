@@ -48,11 +48,11 @@ ContactPair<dim>::respond(const ContactSite<dim> &site, const Vector &relative, 
   const double shear = std::min(wanted, dt * law.shear_limit(normal_force, site.area, true));
   response.kind = Response::Kind::slides;
   response.slip_direction = stick / wanted;
-  response.slip_ratio = normal_force > 0. && shear < wanted
-                            ? dt * (law.shear_limit(normal_force, site.area, true) -
-                                    law.shear_limit(0., site.area, true)) /
-                                  (normal_force * dt)
-                            : 0.;
+  response.slip_ratio =
+      normal_force > 0. && shear < wanted
+          ? dt * (law.shear_limit(normal_force, site.area, true) - law.shear_limit(0., site.area, true)) /
+                (normal_force * dt)
+          : 0.;
   response.impulse += shear * response.slip_direction;
   return response;
 }

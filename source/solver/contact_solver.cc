@@ -43,8 +43,8 @@ std::vector<std::size_t> side(const Scene<dim> &scene, const Continuum<dim> &con
 } // namespace
 
 template <int dim>
-void ContactSolver<dim>::reinit(const SchemeParameters &scheme, const Grid<dim> &grid,
-                                Scene<dim> &used_scene, std::vector<std::unique_ptr<Continuum<dim>>> &used)
+void ContactSolver<dim>::reinit(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &used_scene,
+                                std::vector<std::unique_ptr<Continuum<dim>>> &used)
 {
   scene = &used_scene;
   continua = &used;
@@ -85,9 +85,8 @@ void ContactSolver<dim>::reinit(const SchemeParameters &scheme, const Grid<dim> 
       const auto names_other =
           names_of(other, [&](const std::string &name) { return holds(*scene, one, name); });
       if (names_one.empty()) {
-        ties.push_back(std::make_unique<ContactParameters<dim>>(
-            ContactParameters<dim>::tied(scene->bodies[one.bodies().front()]->name(),
-                                         scene->bodies[other.bodies().front()]->name())));
+        ties.push_back(std::make_unique<ContactParameters<dim>>(ContactParameters<dim>::tied(
+            scene->bodies[one.bodies().front()]->name(), scene->bodies[other.bodies().front()]->name())));
         tied_pairs.push_back(std::make_unique<BodyContact<dim>>(*ties.back(), scheme, grid, *scene, one,
                                                                 other, one.bodies(), other.bodies()));
         continue;

@@ -52,8 +52,8 @@ void Continuum<dim>::begin_implicit_pressure()
     constrains_flux =
         constrains_flux || condition->fluid() == Fluid::flux || condition->fluid() == Fluid::impermeable;
   }
-  pressure = std::make_unique<ImplicitPressure<dim>>(active, alpha, scheme.seepage_inertia,
-                                                     scheme.pressure_stabilisation, scheme.pressure_tolerance);
+  pressure = std::make_unique<ImplicitPressure<dim>>(
+      active, alpha, scheme.seepage_inertia, scheme.pressure_stabilisation, scheme.pressure_tolerance);
   first_increment.resize(members.size());
 }
 

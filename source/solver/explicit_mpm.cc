@@ -160,8 +160,8 @@ void ExplicitMPM<dim>::relocate_points()
 
   if (flags[not_finite]) {
     std::ostringstream text;
-    text << "a stress, pressure or velocity is not finite, t = " << now << " s, step " << continua.front()->fields().dt
-         << " s; use a smaller 'Step factor'";
+    text << "a stress, pressure or velocity is not finite, t = " << now << " s, step "
+         << continua.front()->fields().dt << " s; use a smaller 'Step factor'";
     throw NumericalError(text.str());
   }
   if (flags[error]) {

@@ -175,14 +175,13 @@ void RigidContact<dim>::respond_to(const Generalised &motion, std::vector<Respon
     if (site.gap == far || continuum.mass(site.second) == 0.)
       continue;
     const Vector compliance = this->node_compliance(continuum, site.second);
-    Vector relative = rigid.velocity_at(site.x, motion) -
-                      this->node_velocity(continuum.fields().new_velocity, site.second);
+    Vector relative =
+        rigid.velocity_at(site.x, motion) - this->node_velocity(continuum.fields().new_velocity, site.second);
     for (unsigned int d = 0; d < dim; ++d)
       relative[d] += compliance[d] * site.impulse[d];
     auto fluid = this->fluid_force(continuum, site.second, -site.normal, site.area, step_length);
     fluid.first -= fluid.second * (site.impulse * site.normal);
-    const Response response = responses[s] =
-        this->respond(site, relative, compliance, fluid, step_length);
+    const Response response = responses[s] = this->respond(site, relative, compliance, fluid, step_length);
     if (!site.counts || response.kind == Response::Kind::open)
       continue;
     const Generalised push = rigid.wrench(response.impulse, site.x);
@@ -310,7 +309,8 @@ void RigidContact<dim>::finish(Ledger<dim> &book)
     const Vector end = rigid_velocity - this->node_velocity(continuum.fields().new_velocity, site.second);
     book.contact_dissipation += site.impulse * (0.5 * (site.relative_velocity + end));
     if (rigid.is_prescribed()) {
-      const Vector start = site.relative_velocity + this->node_velocity(continuum.fields().velocity, site.second);
+      const Vector start =
+          site.relative_velocity + this->node_velocity(continuum.fields().velocity, site.second);
       book.external_work += site.impulse * (0.5 * (start + rigid_velocity));
       for (unsigned int d = 0; d < dim; ++d)
         book.impulse[d] += site.impulse[d];

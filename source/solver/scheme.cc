@@ -38,11 +38,12 @@ SchemeParameters::SchemeParameters(Section section)
       "does not lock. 'point': each point on its own; locks in 2-D and 3-D with more than one point a cell.");
   pressure_of_cells = pressure == "cell";
   std::string pore_pressure = "explicit";
-  section.add(
-      "Pore pressure", pore_pressure, {"explicit", "implicit"},
-      "How the pore pressure of a step is found. 'explicit': point by point; the step is limited by undrained "
-      "waves and by diffusion. 'implicit': with the flow and the motion that it causes, from a linear system; "
-      "only the wave in the skeleton limits the step.");
+  section.add("Pore pressure", pore_pressure, {"explicit", "implicit"},
+              "How the pore pressure of a step is found. 'explicit': point by point; the step is limited by "
+              "undrained "
+              "waves and by diffusion. 'implicit': with the flow and the motion that it causes, from a "
+              "linear system; "
+              "only the wave in the skeleton limits the step.");
   implicit_pressure = pore_pressure == "implicit";
   section.add("Pressure stabilisation", pressure_stabilisation, nonnegative(""),
               "Implicit pore pressure: factor on the term that keeps pressures of neighbouring cells from "

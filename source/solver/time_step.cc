@@ -136,13 +136,16 @@ StableStep stable_step(const std::vector<std::unique_ptr<Body<dim>>> &bodies, co
     const unsigned int winner =
         dealii::Utilities::MPI::max(mine.combined == dt ? code : 0u, grid.communicator());
     result.dt = dt;
-    result.limit = std::string(winner % 2 == 0 ? "pressure diffusion" :
-                               implicit_pressure && body->material().mixture() ? "skeleton wave" : "wave") + " in '" + body->name() +
-                   "'" + (winner > 2 ? " (small piece of material)" : "");
+    result.limit = std::string(winner % 2 == 0                                   ? "pressure diffusion"
+                               : implicit_pressure && body->material().mixture() ? "skeleton wave"
+                                                                                 : "wave") +
+                   " in '" + body->name() + "'" + (winner > 2 ? " (small piece of material)" : "");
   }
   return result;
 }
 
-template StableStep stable_step<2>(const std::vector<std::unique_ptr<Body<2>>> &, const Grid<2> &, bool, bool);
-template StableStep stable_step<3>(const std::vector<std::unique_ptr<Body<3>>> &, const Grid<3> &, bool, bool);
+template StableStep stable_step<2>(const std::vector<std::unique_ptr<Body<2>>> &, const Grid<2> &, bool,
+                                   bool);
+template StableStep stable_step<3>(const std::vector<std::unique_ptr<Body<3>>> &, const Grid<3> &, bool,
+                                   bool);
 } // namespace peat

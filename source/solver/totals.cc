@@ -87,8 +87,8 @@ Totals<dim> totals(const Scene<dim> &scene, MPI_Comm communicator)
 template <int dim>
 void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MPI_Comm communicator)
 {
-  std::vector<double> values = {ledger.external_work, ledger.gravity_work,  ledger.seepage_dissipation,
-                                ledger.seepage_work,  ledger.fluid_outflow, ledger.fluid_squeezed,
+  std::vector<double> values = {ledger.external_work, ledger.gravity_work,       ledger.seepage_dissipation,
+                                ledger.seepage_work,  ledger.fluid_outflow,      ledger.fluid_squeezed,
                                 ledger.gross_impulse, ledger.contact_dissipation};
   for (unsigned int d = 0; d < dim; ++d)
     values.push_back(ledger.impulse[d]);
@@ -115,8 +115,8 @@ void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MP
     momentum_error =
         std::max(momentum_error, (now.momentum - start.momentum - book.impulse).norm() / momentum_scale);
 
-  numerical_dissipation = start.energy() + book.external_work + book.seepage_work -
-                          book.contact_dissipation - now.energy();
+  numerical_dissipation =
+      start.energy() + book.external_work + book.seepage_work - book.contact_dissipation - now.energy();
   energy_scale = std::max(
       {energy_scale, now.energy(), start.energy(), std::abs(book.external_work), book.seepage_dissipation});
   if (energy_scale > 0.)

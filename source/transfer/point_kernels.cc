@@ -56,8 +56,8 @@ void PointKernels<dim, reach, saturated>::sum_up(const Body<dim> &body, const Sl
   for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
     const double *row = body.row(body.handles()[i]);
     const double V = row[layout.volume];
-    storage += V * (layout.porosity >= 0 ? mixture.storage(broadcast(row[layout.porosity]))[0] :
-                                           mixture.storage());
+    storage +=
+        V * (layout.porosity >= 0 ? mixture.storage(broadcast(row[layout.porosity]))[0] : mixture.storage());
     rate += V * row[layout.pressure_rate];
     volume += V;
   }

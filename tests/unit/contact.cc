@@ -30,7 +30,8 @@ struct Meeting
          << "\nend\nsubsection Materials\n subsection m\n set Density = 1000\n end\nend\nsubsection Bodies\n"
          << " subsection lower\n set Material = m\n set Shape = " << lower_shape << "\n end\n"
          << " subsection upper\n set Material = m\n set Shape = " << upper_shape << "\n end\nend\n"
-         << "subsection Contacts\n subsection c\n set Bodies = lower, upper\n set Law = frictionless\n end\nend\n"
+         << "subsection Contacts\n subsection c\n set Bodies = lower, upper\n set Law = frictionless\n "
+            "end\nend\n"
          << "subsection Stages\n subsection s\n set Duration = 1\n end\nend\n";
     write_file("meeting.prm", text.str());
     file = std::make_unique<ParameterFile>("meeting.prm", std::vector<std::string>());
@@ -59,7 +60,8 @@ struct Meeting
       near[side].collect(*nodes[side]);
     }
     planes.reinit(places.size());
-    planes.fit(near[0], near[1], places, 0.125, [](std::vector<double> &) {}, [](const bool c) { return c; });
+    planes.fit(
+        near[0], near[1], places, 0.125, [](std::vector<double> &) {}, [](const bool c) { return c; });
   }
 
   /// Equation (42) at a site with a normal.
@@ -101,7 +103,8 @@ BOOST_AUTO_TEST_CASE(laws)
   BOOST_TEST(coulomb->shear_limit(10., 2., false) == 5.);
   BOOST_TEST(coulomb->tension_limit(2.) == 0.);
   BOOST_TEST(coulomb->on_effective_stress());
-  BOOST_TEST(!law("set Law = coulomb\nset Friction = 0.4\nset Friction on = total stress")->on_effective_stress());
+  BOOST_TEST(
+      !law("set Law = coulomb\nset Friction = 0.4\nset Friction on = total stress")->on_effective_stress());
   const auto adhesive = law("set Law = adhesive\nset Friction = 0.1\nset Adhesion = 100");
   BOOST_TEST(adhesive->shear_limit(10., 2., true) == 201.);
   BOOST_TEST(adhesive->tension_limit(2.) == 200.);

@@ -58,8 +58,8 @@ struct Layout
   /// How deep below the body's surface the point was at the start, in units of its half extent towards the
   /// surface; 0 for points far from it; contact.
   int surface_depth = -1;
-  int state = -1;             ///< what the law remembers
-  unsigned int n_state = 0;   ///< number of columns of the law's memory
+  int state = -1;           ///< what the law remembers
+  unsigned int n_state = 0; ///< number of columns of the law's memory
 
 private:
   int add(const std::string &name, const std::string &unit, unsigned int n_components, Kind kind);

@@ -9,14 +9,14 @@ namespace peat {
 template <int dim>
 struct ContactSite
 {
-  std::uint32_t first;           ///< node of the first continuum; no_index if the first body is rigid
-  std::uint32_t second;          ///< node of the second continuum
-  bool counts;                   ///< this rank adds it to sums over sites
-  dealii::Point<dim> x;          ///< where forces act
-  dealii::Tensor<1, dim> normal; ///< from the first body to the second
-  double gap;                    ///< between their surfaces [m]; negative if they overlap
-  double area;                   ///< of the interface [m^(dim-1)]
-  dealii::Tensor<1, dim> impulse;           ///< of this step, on the second body [N s]
+  std::uint32_t first;            ///< node of the first continuum; no_index if the first body is rigid
+  std::uint32_t second;           ///< node of the second continuum
+  bool counts;                    ///< this rank adds it to sums over sites
+  dealii::Point<dim> x;           ///< where forces act
+  dealii::Tensor<1, dim> normal;  ///< from the first body to the second
+  double gap;                     ///< between their surfaces [m]; negative if they overlap
+  double area;                    ///< of the interface [m^(dim-1)]
+  dealii::Tensor<1, dim> impulse; ///< of this step, on the second body [N s]
   dealii::Tensor<1, dim> relative_velocity; ///< of the first body, at the start of the step [m/s]
 };
 

@@ -20,7 +20,8 @@ public:
   Continuum(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &scene,
             std::vector<std::size_t> bodies);
 
-  /// Number the nodes that carry these bodies, and `more_nodes` (of this rank's part of the mesh). Collective.
+  /// Number the nodes that carry these bodies, and `more_nodes` (of this rank's part of the mesh).
+  /// Collective.
   void number_nodes(const std::vector<NodeId> &more_nodes);
   /// Cells of this rank that hold points of the bodies, ascending.
   std::vector<CellId> occupied_cells() const;
@@ -34,7 +35,8 @@ public:
   void solve_darcy();
   /// Implicit pressures: their increments, and what they do to motion and flux.
   void solve_pressure();
-  /// Velocities of the points; with modified-update-stress-last mapped back to the nodes: carrying_velocity().
+  /// Velocities of the points; with modified-update-stress-last mapped back to the nodes:
+  /// carrying_velocity().
   void advance_points();
   void deform_points();
   void book_balances(Ledger<dim> &book) const;

@@ -7,9 +7,10 @@ namespace peat {
 template <int dim>
 struct Ledger
 {
-  double external_work = 0.;       ///< of tractions, gravity, prescribed motion and local damping [J]
-  double gravity_work = 0.;        ///< of gravity alone [J]
-  double contact_dissipation = 0.; ///< what contact takes out: friction, and velocities that it makes equal [J]
+  double external_work = 0.; ///< of tractions, gravity, prescribed motion and local damping [J]
+  double gravity_work = 0.;  ///< of gravity alone [J]
+  double contact_dissipation =
+      0.; ///< what contact takes out: friction, and velocities that it makes equal [J]
   double seepage_dissipation = 0.; ///< integral of |w|^2 / kappa [J]
   double seepage_work = 0.;  ///< all that Darcy's law takes from the fluid's energy p^2 / (2 Q), negative [J]
   double fluid_outflow = 0.; ///< of pore fluid through the boundaries [m^dim]

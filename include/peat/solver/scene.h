@@ -18,9 +18,9 @@ namespace peat {
 template <int dim>
 struct ContactState
 {
-  dealii::Tensor<1, dim> force; ///< [N]
-  double normal_force = 0.;     ///< compression positive [N]
-  double area = 0.;             ///< that bears force [m^(dim-1)]
+  dealii::Tensor<1, dim> force;                         ///< [N]
+  double normal_force = 0.;                             ///< compression positive [N]
+  double area = 0.;                                     ///< that bears force [m^(dim-1)]
   double gap = std::numeric_limits<double>::infinity(); ///< smallest; infinite if far apart [m]
 };
 
