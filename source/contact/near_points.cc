@@ -25,6 +25,7 @@ void NearPoints<dim>::collect(const ActiveNodes<dim> &nodes)
 {
   data.clear();
   list.clear();
+  around.clear();
   if (basis == Basis::q1)
     collect<2>(nodes);
   else
@@ -70,6 +71,8 @@ void NearPoints<dim>::collect(const ActiveNodes<dim> &nodes)
           const std::uint32_t site = sites[cell_nodes[i]];
           if (site == no_index)
             continue;
+          if (data[first + l].depth > 0.)
+            around.push_back({site, std::uint32_t(first + l)});
           unsigned int k[dim];
           Entry entry{site, std::uint32_t(first + l), 1., {}};
           for (unsigned int d = 0, rest = i; d < dim; ++d, rest /= reach) {

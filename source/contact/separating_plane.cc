@@ -7,51 +7,64 @@ template <int dim>
 void SeparatingPlanes<dim>::reinit(const std::size_t n_sites)
 {
   sums.assign(n_sites * n_sums, 0.);
-  planes.assign(n_sites * n_unknowns, 0.);
+  for (auto &of_stage : planes)
+    of_stage.assign(n_sites * n_unknowns, 0.);
+  shifts.resize(n_sites);
+}
+
+template <int dim>
+void SeparatingPlanes<dim>::find_shifts()
+{
+  for (std::size_t site = 0; site < shifts.size(); ++site)
+    shifts[site] = stage == 0 ? dealii::Tensor<1, dim>() : share_to_surface * normal(site, stage - 1);
 }
 
 template <int dim>
 void SeparatingPlanes<dim>::add(const NearPoints<dim> &points, const double side,
                                 const std::vector<dealii::Point<dim>> &center, const double length)
 {
-  for (const auto &entry : points.entries()) {
-    const double *plane = &planes[std::size_t(entry.site) * n_unknowns];
+  for (const auto &entry : points.neighbours()) {
+    const double *plane = &planes[stage][std::size_t(entry.site) * n_unknowns];
     double X[n_unknowns];
-    const auto &x = points.points()[entry.point].x;
+    const auto &point = points.points()[entry.point];
+    const auto &shift = shifts[entry.site];
+    const auto x = point.x - side * point.reach(shift) * (shift.norm() > 0. ? shift / shift.norm() : shift);
     double s = plane[dim];
     X[dim] = 1.;
     for (unsigned int d = 0; d < dim; ++d) {
       X[d] = (x[d] - center[entry.site][d]) / length;
       s += plane[d] * X[d];
     }
-    // L = 2 / (1 + exp(-s)) - 1 is to be -1 in the first body and 1 in the second.
-    const double L = std::tanh(0.5 * s), slope = 0.5 * (1. - L * L);
+    // The derivatives of log(1 + exp(-side s)), a convex function of the plane.
+    const double L = std::tanh(0.5 * s), curvature = 0.25 * (1. - L * L);
     double *sum = &sums[std::size_t(entry.site) * n_sums];
     for (unsigned int i = 0; i < n_unknowns; ++i)
       for (unsigned int j = i; j < n_unknowns; ++j)
-        *sum++ += slope * slope * X[i] * X[j];
+        *sum++ += curvature * X[i] * X[j];
     for (unsigned int i = 0; i < n_unknowns; ++i)
-      *sum++ += slope * (side - L) * X[i];
+      *sum++ += 0.5 * (side - L) * X[i];
   }
 }
 
 template <int dim>
 bool SeparatingPlanes<dim>::improve()
 {
-  // Keeps the planes of separable points finite: the steeper the function, the fewer points decide.
+  // Keeps the planes of separable points finite: the smaller, the steeper they are and the fewer points
+  // decide.
   constexpr double penalty = 1e-4;
   constexpr double still = 1e-8;
   using Matrix = Eigen::Matrix<double, n_unknowns, n_unknowns>;
   using Vector = Eigen::Matrix<double, n_unknowns, 1>;
   bool converged = true;
-  for (std::size_t site = 0; site < planes.size() / n_unknowns; ++site) {
+  for (std::size_t site = 0; site < shifts.size(); ++site) {
     const double *sum = &sums[site * n_sums];
-    Eigen::Map<Vector> plane(&planes[site * n_unknowns]);
+    Eigen::Map<Vector> plane(&planes[stage][site * n_unknowns]);
     Matrix A;
     for (unsigned int i = 0; i < n_unknowns; ++i)
       for (unsigned int j = i; j < n_unknowns; ++j)
         A(i, j) = A(j, i) = *sum++;
     Vector b(sum);
+    // No points, or those of one body alone.
     if (A(dim, dim) == 0.)
       continue;
     for (unsigned int d = 0; d < dim; ++d) {
@@ -73,11 +86,12 @@ bool SeparatingPlanes<dim>::improve()
 }
 
 template <int dim>
-dealii::Tensor<1, dim> SeparatingPlanes<dim>::normal(const std::size_t site) const
+dealii::Tensor<1, dim> SeparatingPlanes<dim>::normal(const std::size_t site,
+                                                     const unsigned int of_stage) const
 {
   dealii::Tensor<1, dim> n;
   for (unsigned int d = 0; d < dim; ++d)
-    n[d] = planes[site * n_unknowns + d];
+    n[d] = planes[of_stage][site * n_unknowns + d];
   return n.norm() > 0. ? n / n.norm() : n;
 }
 

@@ -76,6 +76,7 @@ Scene<dim> make_scene(Case<dim> &parameters, const Grid<dim> &grid)
   scene.contacts = parameters.contacts;
   scene.conditions = std::move(parameters.conditions);
   check_scene(parameters, scene, grid);
+  scene.continua = find_continua(scene, grid.communicator());
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
     if (!parameters.entry_stage(parameters.bodies[b]).empty())
       scene.bodies[b]->withdraw();
@@ -92,6 +93,7 @@ Scene<dim> make_gauss_scene(const Case<dim> &parameters, const Grid<dim> &grid)
         std::make_unique<Body<dim>>(body, parameters.material(body.material), grid, fields));
     cover(parameters, body.name, fields.gauss_points, scene.surfaces.emplace(body.name, grid).first->second);
   }
+  scene.continua = find_continua(scene, grid.communicator());
   return scene;
 }
 

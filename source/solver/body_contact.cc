@@ -8,12 +8,9 @@ BodyContact<dim>::BodyContact(const ContactParameters<dim> &parameters, const Sc
                               const Grid<dim> &grid, const Scene<dim> &scene, Continuum<dim> &first,
                               Continuum<dim> &second, std::vector<std::size_t> first_bodies,
                               std::vector<std::size_t> second_bodies)
-    : ContactPair<dim>(parameters, grid.communicator()), scheme(scheme), grid(grid), scene(scene),
-      first(first), second(second), first_bodies(std::move(first_bodies)),
-      second_bodies(std::move(second_bodies)),
-      parallel(dealii::Utilities::MPI::n_mpi_processes(grid.communicator()) > 1)
+    : ContactPair<dim>(parameters, scheme, grid, scene), first(first), second(second),
+      first_bodies(std::move(first_bodies)), second_bodies(std::move(second_bodies))
 {
-  this->seepage_inertia = scheme.seepage_inertia;
   this->alpha = ContactPair<dim>::biot_coefficient(first.is_saturated() ? first : second, scene);
 }
 
@@ -22,7 +19,7 @@ std::vector<const Body<dim> *> BodyContact<dim>::pointers(const std::vector<std:
 {
   std::vector<const Body<dim> *> result;
   for (const std::size_t b : bodies)
-    result.push_back(scene.bodies[b].get());
+    result.push_back(this->scene.bodies[b].get());
   return result;
 }
 
@@ -32,15 +29,14 @@ void BodyContact<dim>::match_nodes()
   const ActiveNodes<dim> &nodes = first.nodes(), &other = second.nodes();
   sites.clear();
   places.clear();
-  std::array<std::vector<std::uint32_t>, 2> site_of_node;
-  site_of_node[0].assign(nodes.size(), no_index);
-  site_of_node[1].assign(other.size(), no_index);
+  site_of_node.assign(nodes.size(), no_index);
+  std::vector<std::uint32_t> site_of_other(other.size(), no_index);
   for (std::uint32_t i = 0; i < nodes.size(); ++i) {
     const std::uint32_t j = other.index_of(nodes.grid_node(i));
     if (j == no_index)
       continue;
-    site_of_node[0][i] = site_of_node[1][j] = sites.size();
-    ContactSite<dim> site{};
+    site_of_node[i] = site_of_other[j] = sites.size();
+    ContactSite<dim> site;
     site.first = i;
     site.second = j;
     site.counts = nodes.is_owned(i);
@@ -48,57 +44,58 @@ void BodyContact<dim>::match_nodes()
     sites.push_back(site);
     places.push_back(site.x);
   }
-  near[0].choose(nodes, scheme.basis, pointers(first_bodies), std::move(site_of_node[0]));
-  near[1].choose(other, scheme.basis, pointers(second_bodies), std::move(site_of_node[1]));
+  near[0].choose(nodes, this->scheme.basis, pointers(first_bodies), site_of_node);
+  near[1].choose(other, this->scheme.basis, pointers(second_bodies), std::move(site_of_other));
   planes.reinit(sites.size());
+  for (unsigned int side = 0; side < 2; ++side)
+    noted[side].reinit(continuum(side).nodes());
 }
 
 template <int dim>
 template <typename Combine>
 void BodyContact<dim>::over_ranks(std::vector<double> &values, const unsigned int n_columns,
-                                  const Continuum<dim> &side, const Combine &combine) const
+                                  const unsigned int side, const Combine &combine)
 {
-  const bool is_first = &side == &first;
-  all_nodes.assign(side.nodes().size() * std::size_t(n_columns), 0.);
+  nodal_values.assign(continuum(side).nodes().size() * std::size_t(n_columns), 0.);
   for (std::size_t s = 0; s < sites.size(); ++s)
     std::copy_n(&values[s * n_columns], n_columns,
-                &all_nodes[std::size_t(is_first ? sites[s].first : sites[s].second) * n_columns]);
-  combine(all_nodes.data());
+                &nodal_values[std::size_t(node(sites[s], side)) * n_columns]);
+  combine(nodal_values.data());
   for (std::size_t s = 0; s < sites.size(); ++s)
-    std::copy_n(&all_nodes[std::size_t(is_first ? sites[s].first : sites[s].second) * n_columns], n_columns,
+    std::copy_n(&nodal_values[std::size_t(node(sites[s], side)) * n_columns], n_columns,
                 &values[s * n_columns]);
 }
 
 template <int dim>
 void BodyContact<dim>::add_over_ranks(std::vector<double> &values, const unsigned int n_columns,
-                                      const Continuum<dim> &side) const
+                                      const unsigned int side)
 {
-  if (parallel)
-    over_ranks(values, n_columns, side, [&](double *data) { side.nodes().sum_over_ranks(data, n_columns); });
+  if (this->parallel)
+    over_ranks(values, n_columns, side,
+               [&](double *data) { continuum(side).nodes().sum_over_ranks(data, n_columns); });
 }
 
 template <int dim>
-void BodyContact<dim>::max_over_ranks(std::vector<double> &values, const Continuum<dim> &side) const
+void BodyContact<dim>::begin(const double dt)
 {
-  if (parallel)
-    over_ranks(values, 1, side, [&](double *data) { side.nodes().max_over_ranks(data, 1); });
-}
-
-template <int dim>
-void BodyContact<dim>::begin(double, const double dt)
-{
-  step_length = dt;
+  this->step_length = dt;
   this->now = {};
-  if (!parallel && sites.empty())
+  if (!this->parallel && sites.empty())
     return;
-  for (unsigned int side = 0; side < 2; ++side)
-    near[side].collect(continuum(side).nodes());
-  find_normals();
-  find_gaps();
+  if (this->parameters.law->ties())
+    take_all_nodes();
+  else {
+    for (unsigned int side = 0; side < 2; ++side)
+      near[side].collect(continuum(side).nodes());
+    find_normals();
+    find_gaps();
+    find_surfaces();
+  }
   for (ContactSite<dim> &site : sites) {
     site.impulse = Vector();
-    site.relative_velocity = this->node_velocity(first.fields().velocity, site.first) -
-                             this->node_velocity(second.fields().velocity, site.second);
+    if (site.acts)
+      site.relative_velocity = this->velocity(first.fields().velocity, site.first_surface) -
+                               this->velocity(second.fields().velocity, site.second_surface);
   }
 }
 
@@ -112,37 +109,33 @@ void BodyContact<dim>::find_normals()
     for (const auto &entry : near[side].entries())
       for (unsigned int d = 0; d < dim; ++d)
         gradient[std::size_t(entry.site) * dim + d] += near[side].points()[entry.point].volume * entry.dN[d];
-    add_over_ranks(gradient, dim, continuum(side));
+    add_over_ranks(gradient, dim, side);
   }
   const Normal method = this->parameters.normal;
   if (method == Normal::regression)
     planes.fit(
-        near[0], near[1], places, grid.smallest_cell_size(),
-        [&](std::vector<double> &sums) { add_over_ranks(sums, SeparatingPlanes<dim>::n_sums, first); },
+        near[0], near[1], places, this->grid.smallest_cell_size(),
+        [&](std::vector<double> &sums) { add_over_ranks(sums, SeparatingPlanes<dim>::n_sums, 0); },
         [&](const bool converged) {
-          return parallel ? dealii::Utilities::MPI::min(int(converged), this->communicator) == 1 : converged;
+          return this->parallel ? dealii::Utilities::MPI::min(int(converged), this->communicator) == 1
+                                : converged;
         });
   for (std::size_t s = 0; s < sites.size(); ++s) {
     Vector g[2];
     for (unsigned int side = 0; side < 2; ++side)
       for (unsigned int d = 0; d < dim; ++d)
         g[side][d] = volume_gradient[side][s * dim + d];
-    // sum V grad N points out of a body.
-    Vector n = method == Normal::prescribed   ? this->parameters.direction
-               : method == Normal::regression ? planes.normal(s)
-                                              : g[0] - g[1];
-    n = n.norm() > 0. ? n / n.norm() : n;
-    sites[s].normal = n;
-    sites[s].area = std::max(0., std::min(g[0] * n, -(g[1] * n)));
+    const Vector n = method == Normal::prescribed   ? this->parameters.direction
+                     : method == Normal::regression ? planes.normal(s)
+                                                    : g[0] - g[1];
+    sites[s].normal = n.norm() > 0. ? n / n.norm() : n;
   }
 }
 
 template <int dim>
 void BodyContact<dim>::find_gaps()
 {
-  const double far = std::numeric_limits<double>::max();
-  // How far the first body reaches along the normal, and the second against it.
-  std::array<std::vector<double>, 2> edge;
+  constexpr double far = ContactPair<dim>::far;
   for (unsigned int side = 0; side < 2; ++side) {
     const double sign = side == 0 ? 1. : -1.;
     edge[side].assign(sites.size(), -far);
@@ -154,48 +147,85 @@ void BodyContact<dim>::find_gaps()
       edge[side][entry.site] =
           std::max(edge[side][entry.site], sign * ((point.x - sites[entry.site].x) * n) + point.reach(n));
     }
-    max_over_ranks(edge[side], continuum(side));
+    if (this->parallel)
+      over_ranks(edge[side], 1, side, [&](double *data) { continuum(side).nodes().max_over_ranks(data, 1); });
   }
-  for (std::size_t s = 0; s < sites.size(); ++s)
-    sites[s].gap = edge[0][s] == -far || edge[1][s] == -far ? far : -edge[0][s] - edge[1][s];
+  for (std::size_t s = 0; s < sites.size(); ++s) {
+    const bool both = edge[0][s] > -far && edge[1][s] > -far && has_mass(sites[s]);
+    sites[s].gap = both ? -edge[0][s] - edge[1][s] : far;
+  }
+}
+
+template <int dim>
+void BodyContact<dim>::take_all_nodes()
+{
+  for (ContactSite<dim> &site : sites) {
+    site.acts = has_mass(site);
+    site.first_surface = {{site.first, no_index, no_index}, {1., 0., 0.}};
+    site.second_surface = {{site.second, no_index, no_index}, {1., 0., 0.}};
+  }
+}
+
+template <int dim>
+void BodyContact<dim>::find_surfaces()
+{
+  // sum V grad N points out of a body.
+  for (unsigned int side = 0; side < 2; ++side)
+    areas[side].resize(sites.size());
+  both_areas.resize(sites.size());
+  for (std::size_t s = 0; s < sites.size(); ++s) {
+    double g[2] = {0., 0.};
+    for (unsigned int side = 0; side < 2; ++side)
+      for (unsigned int d = 0; d < dim; ++d)
+        g[side] += volume_gradient[side][s * dim + d] * sites[s].normal[d];
+    areas[0][s] = std::max(0., g[0]);
+    areas[1][s] = std::max(0., -g[1]);
+    both_areas[s] = areas[0][s] + areas[1][s];
+  }
+  this->find_lines(first.nodes(), &ContactSite<dim>::first, site_of_node, both_areas);
+  for (ContactSite<dim> &site : sites)
+    if (site.acts) {
+      site.area = std::min(this->weigh(site, &ContactSite<dim>::first, areas[0], site.first_surface),
+                           this->weigh(site, &ContactSite<dim>::second, areas[1], site.second_surface));
+      site.acts = site.area > 0.;
+    }
 }
 
 template <int dim>
 double BodyContact<dim>::solve()
 {
-  const double dt = step_length;
   double largest = 0.;
   for (ContactSite<dim> &site : sites) {
-    const Vector compliance_first = this->node_compliance(first, site.first),
-                 compliance_second = this->node_compliance(second, site.second),
-                 compliance = compliance_first + compliance_second;
-    if (first.mass(site.first) == 0. || second.mass(site.second) == 0. ||
-        (site.normal.norm_square() == 0. && !this->parameters.law->ties()))
+    if (!site.counts || !site.acts)
       continue;
-    Vector relative = this->node_velocity(first.fields().new_velocity, site.first) -
-                      this->node_velocity(second.fields().new_velocity, site.second);
+    const Vector compliance =
+        this->compliance(first, site.first_surface) + this->compliance(second, site.second_surface);
+    Vector relative = this->velocity(first.fields().new_velocity, site.first_surface) -
+                      this->velocity(second.fields().new_velocity, site.second_surface);
     for (unsigned int d = 0; d < dim; ++d)
       relative[d] += compliance[d] * site.impulse[d];
     std::pair<double, double> fluid = {0., 0.};
     if (first.is_saturated())
-      fluid = this->fluid_force(first, site.first, site.normal, site.area, dt);
+      fluid = this->fluid_force(first, site.first_surface, site.normal, site.area);
     if (second.is_saturated()) {
-      const auto other = this->fluid_force(second, site.second, -site.normal, site.area, dt);
+      const auto other = this->fluid_force(second, site.second_surface, -site.normal, site.area);
       const double share = first.is_saturated() ? 0.5 : 1.;
       fluid.first = (1. - share) * fluid.first + share * other.first;
       fluid.second = (1. - share) * fluid.second + share * other.second;
     }
     fluid.first -= fluid.second * (site.impulse * site.normal);
-    const auto response = this->respond(site, relative, compliance, fluid, dt);
+    const auto response = this->respond(site, relative, compliance, fluid);
     const Vector change = response.impulse - site.impulse;
     if (change.norm_square() == 0.)
       continue;
     site.impulse = response.impulse;
-    this->push(first, site.first, -change, dt);
-    this->push(second, site.second, change, dt);
+    this->push(noted[0], site.first_surface, -change);
+    this->push(noted[1], site.second_surface, change);
     for (unsigned int d = 0; d < dim; ++d)
       largest = std::max(largest, compliance[d] * std::abs(change[d]));
   }
+  this->give_impulses(first, noted[0]);
+  this->give_impulses(second, noted[1]);
   return largest;
 }
 
@@ -205,20 +235,20 @@ void BodyContact<dim>::finish(Ledger<dim> &book)
   std::vector<double> sums(dim + 2, 0.);
   double gap = std::numeric_limits<double>::infinity();
   for (const ContactSite<dim> &site : sites) {
-    if (!site.counts || first.mass(site.first) == 0. || second.mass(site.second) == 0.)
+    if (!site.counts || !site.acts)
       continue;
     gap = std::min(gap, site.gap);
     if (site.impulse.norm_square() == 0.)
       continue;
-    const Vector end = this->node_velocity(first.fields().new_velocity, site.first) -
-                       this->node_velocity(second.fields().new_velocity, site.second);
+    const Vector end = this->velocity(first.fields().new_velocity, site.first_surface) -
+                       this->velocity(second.fields().new_velocity, site.second_surface);
     book.contact_dissipation += site.impulse * (0.5 * (site.relative_velocity + end));
     for (unsigned int d = 0; d < dim; ++d)
-      sums[d] -= site.impulse[d] / step_length;
-    sums[dim] += site.impulse * site.normal / step_length;
+      sums[d] -= site.impulse[d] / this->step_length;
+    sums[dim] += site.impulse * site.normal / this->step_length;
     sums[dim + 1] += site.area;
   }
-  if (parallel) {
+  if (this->parallel) {
     dealii::Utilities::MPI::sum(sums, this->communicator, sums);
     gap = dealii::Utilities::MPI::min(gap, this->communicator);
   }
@@ -226,7 +256,7 @@ void BodyContact<dim>::finish(Ledger<dim> &book)
     this->now.force[d] = sums[d];
   this->now.normal_force = sums[dim];
   this->now.area = sums[dim + 1];
-  this->now.gap = gap < std::numeric_limits<double>::max() ? gap : std::numeric_limits<double>::infinity();
+  this->now.gap = gap;
 }
 
 template <int dim>
@@ -243,34 +273,36 @@ template <int dim>
 void BodyContact<dim>::constrain_flux()
 {
   for (const ContactSite<dim> &site : sites)
-    if (site.impulse * site.normal > 0.) {
-      this->set_flux(first, site.first, site.normal, site.area);
-      this->set_flux(second, site.second, -site.normal, site.area);
+    if (site.counts && site.impulse * site.normal > 0.) {
+      this->note_flux(first, site.first_surface, site.normal, site.area, noted[0]);
+      this->note_flux(second, site.second_surface, -site.normal, site.area, noted[1]);
     }
+  this->change_flux(first, noted[0]);
+  this->change_flux(second, noted[1]);
 }
 
 template <int dim>
 void BodyContact<dim>::constrain_carrying_velocity()
 {
   for (const ContactSite<dim> &site : sites) {
-    if (site.impulse.norm_square() == 0.)
+    if (!site.counts || site.impulse.norm_square() == 0.)
       continue;
-    const Vector compliance_first = this->node_compliance(first, site.first),
-                 compliance_second = this->node_compliance(second, site.second);
-    const Vector relative = this->node_velocity(first.carrying_velocity(), site.first) -
-                            this->node_velocity(second.carrying_velocity(), site.second);
+    const Vector compliance =
+        this->compliance(first, site.first_surface) + this->compliance(second, site.second_surface);
+    const Vector relative = this->velocity(first.carrying_velocity(), site.first_surface) -
+                            this->velocity(second.carrying_velocity(), site.second_surface);
     double normal_compliance = 0.;
     for (unsigned int d = 0; d < dim; ++d)
-      normal_compliance += site.normal[d] * site.normal[d] * (compliance_first[d] + compliance_second[d]);
-    const double closing = relative * site.normal - std::max(site.gap, 0.) / step_length;
+      normal_compliance += site.normal[d] * site.normal[d] * compliance[d];
+    const double closing = relative * site.normal - std::max(site.gap, 0.) / this->step_length;
     if (closing <= 0. || normal_compliance == 0.)
       continue;
-    for (unsigned int d = 0; d < dim; ++d) {
-      const double impulse = closing / normal_compliance * site.normal[d];
-      first.carrying_velocity()[std::size_t(site.first) * dim + d] -= compliance_first[d] * impulse;
-      second.carrying_velocity()[std::size_t(site.second) * dim + d] += compliance_second[d] * impulse;
-    }
+    const Vector impulse = closing / normal_compliance * site.normal;
+    this->push(noted[0], site.first_surface, -impulse);
+    this->push(noted[1], site.second_surface, impulse);
   }
+  this->change_carrying_velocity(first, noted[0]);
+  this->change_carrying_velocity(second, noted[1]);
 }
 
 template class BodyContact<2>;

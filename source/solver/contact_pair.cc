@@ -2,31 +2,42 @@
 
 #include <peat/material/mixture.h>
 
+#include <deal.II/base/mpi.h>
+
 namespace peat {
+template <int dim>
+ContactPair<dim>::ContactPair(const ContactParameters<dim> &parameters, const SchemeParameters &scheme,
+                              const Grid<dim> &grid, const Scene<dim> &scene)
+    : parameters(parameters), scheme(scheme), grid(grid), scene(scene), communicator(grid.communicator()),
+      parallel(dealii::Utilities::MPI::n_mpi_processes(grid.communicator()) > 1),
+      touching(1e-9 * grid.smallest_cell_size())
+{}
+
 template <int dim>
 typename ContactPair<dim>::Response
 ContactPair<dim>::respond(const ContactSite<dim> &site, const Vector &relative, const Vector &compliance,
-                          const std::pair<double, double> &fluid_force, const double dt) const
+                          const std::pair<double, double> &fluid_force) const
 {
   const ContactLaw &law = *parameters.law;
+  const double dt = step_length;
   const Vector &n = site.normal;
   Response response;
   double normal_compliance = 0.;
   for (unsigned int d = 0; d < dim; ++d)
     normal_compliance += n[d] * n[d] * compliance[d];
-  if (normal_compliance == 0.)
-    return response;
   if (law.ties()) {
     response.kind = Response::Kind::sticks;
     for (unsigned int d = 0; d < dim; ++d)
       response.impulse[d] = compliance[d] > 0. ? relative[d] / compliance[d] : 0.;
     return response;
   }
+  if (normal_compliance == 0.)
+    return response;
 
   // Surfaces that are apart may come as near as to touch at the end of the step.
   const double closing = relative * n;
   const double normal_impulse = (closing - std::max(site.gap, 0.) / dt) / normal_compliance;
-  const double least = site.gap <= 0. ? -law.tension_limit(site.area) * dt : 0.;
+  const double least = site.gap <= touching ? -law.tension_limit(site.area) * dt : 0.;
   if (normal_impulse <= least)
     return response;
 
@@ -58,6 +69,79 @@ ContactPair<dim>::respond(const ContactSite<dim> &site, const Vector &relative, 
 }
 
 template <int dim>
+void ContactPair<dim>::find_lines(const ActiveNodes<dim> &nodes, std::uint32_t ContactSite<dim>::*node,
+                                  const std::vector<std::uint32_t> &site_of_node,
+                                  const std::vector<double> &areas)
+{
+  // Neighbours that carry the same but for round-off.
+  constexpr double slack = 1e-6;
+  // Sites of an interface at 45 degrees to the mesh take the same of two axes that suit them equally.
+  constexpr double preference = 1.2;
+  const auto area = [&](const std::uint32_t site) { return site == no_index ? 0. : areas[site]; };
+  for (std::uint32_t s = 0; s < sites.size(); ++s) {
+    ContactSite<dim> &site = sites[s];
+    site.line = {s, no_index, no_index};
+    site.acts = site.gap < far && site.normal.norm_square() > 0. && areas[s] > 0.;
+    if (!site.acts)
+      continue;
+    unsigned int axis = 0;
+    for (unsigned int d = 1; d < dim; ++d)
+      if (std::abs(site.normal[d]) > preference * std::abs(site.normal[axis]))
+        axis = d;
+    auto lattice = grid.node_lattice(nodes.grid_node(site.*node));
+    for (const int step : {-1, 2}) {
+      lattice[axis] += step;
+      if (lattice[axis] < 0 || lattice[axis] > grid.n_cells(axis))
+        continue;
+      const NodeId grid_node = grid.node_at(lattice);
+      const std::uint32_t i = grid_node == no_index ? no_index : nodes.index_of(grid_node);
+      site.line[step < 0 ? 1 : 2] = i == no_index ? no_index : site_of_node[i];
+    }
+    site.acts = areas[s] >= (1. - slack) * std::max(area(site.line[1]), area(site.line[2]));
+  }
+  for (ContactSite<dim> &site : sites)
+    if (site.acts && site.line[1] != no_index && sites[site.line[1]].acts)
+      site.acts = false;
+
+  // Where lines along different axes meet, a node belongs to the site at it, else to that whose share is
+  // larger.
+  constexpr std::uint32_t nobody = no_index;
+  owner_of_site.assign(sites.size(), nobody);
+  for (std::uint32_t s = 0; s < sites.size(); ++s)
+    if (sites[s].acts)
+      owner_of_site[s] = s;
+  for (std::uint32_t s = 0; s < sites.size(); ++s)
+    if (sites[s].acts)
+      for (const unsigned int k : {1u, 2u})
+        if (const std::uint32_t other = sites[s].line[k]; other != no_index && !sites[other].acts) {
+          std::uint32_t &owner = owner_of_site[other];
+          if (owner == nobody || areas[s] > areas[owner])
+            owner = s;
+        }
+  for (std::uint32_t s = 0; s < sites.size(); ++s)
+    for (std::uint32_t &other : sites[s].line)
+      if (other != no_index && owner_of_site[other] != s)
+        other = no_index;
+}
+
+template <int dim>
+double ContactPair<dim>::weigh(const ContactSite<dim> &site, std::uint32_t ContactSite<dim>::*node,
+                               const std::vector<double> &areas, SurfaceNodes &surface) const
+{
+  double sum = 0.;
+  surface = {};
+  for (unsigned int k = 0; k < 3; ++k)
+    if (const std::uint32_t other = site.line[k]; other != no_index && areas[other] > 0.) {
+      surface.node[k] = sites[other].*node;
+      surface.weight[k] = areas[other];
+      sum += areas[other];
+    }
+  for (double &weight : surface.weight)
+    weight *= sum > 0. ? 1. / sum : 0.;
+  return sum;
+}
+
+template <int dim>
 typename ContactPair<dim>::Vector ContactPair<dim>::node_compliance(const Continuum<dim> &continuum,
                                                                     const std::uint32_t node)
 {
@@ -69,34 +153,53 @@ typename ContactPair<dim>::Vector ContactPair<dim>::node_compliance(const Contin
 }
 
 template <int dim>
-typename ContactPair<dim>::Vector ContactPair<dim>::node_velocity(const std::vector<double> &field,
-                                                                  const std::uint32_t node)
+typename ContactPair<dim>::Vector ContactPair<dim>::compliance(const Continuum<dim> &continuum,
+                                                               const SurfaceNodes &surface)
+{
+  Vector sum;
+  for (unsigned int k = 0; k < 3; ++k)
+    if (surface.weight[k] > 0.)
+      sum += surface.weight[k] * surface.weight[k] * node_compliance(continuum, surface.node[k]);
+  return sum;
+}
+
+template <int dim>
+typename ContactPair<dim>::Vector ContactPair<dim>::velocity(const std::vector<double> &field,
+                                                             const SurfaceNodes &surface)
 {
   Vector v;
-  for (unsigned int d = 0; d < dim; ++d)
-    v[d] = field[std::size_t(node) * dim + d];
+  for (unsigned int k = 0; k < 3; ++k)
+    if (surface.weight[k] > 0.)
+      for (unsigned int d = 0; d < dim; ++d)
+        v[d] += surface.weight[k] * field[std::size_t(surface.node[k]) * dim + d];
   return v;
 }
 
 template <int dim>
-void ContactPair<dim>::push(Continuum<dim> &continuum, const std::uint32_t node, const Vector &impulse,
-                            const double dt)
+void ContactPair<dim>::push(NodalAdditions<dim> &noted, const SurfaceNodes &surface,
+                            const Vector &impulse) const
 {
-  const Vector compliance = node_compliance(continuum, node);
+  for (unsigned int k = 0; k < 3; ++k)
+    if (surface.weight[k] > 0.)
+      noted.note(surface.node[k], surface.weight[k] * impulse);
+}
+
+template <int dim>
+void ContactPair<dim>::give_impulses(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const
+{
   NodalFields<dim> &fields = continuum.fields();
-  for (unsigned int d = 0; d < dim; ++d) {
-    const std::size_t row = std::size_t(node) * dim + d;
-    const double change = compliance[d] * impulse[d];
+  noted.add_up(parallel, [&](const std::size_t row, const double impulse) {
+    const double change = node_compliance(continuum, row / dim)[row % dim] * impulse;
     fields.new_velocity[row] += change;
-    fields.acceleration[row] += change / dt;
-    fields.contact_force[row] += impulse[d] / dt;
-  }
+    fields.acceleration[row] += change / step_length;
+    fields.contact_force[row] += impulse / step_length;
+  });
 }
 
 template <int dim>
 std::pair<double, double> ContactPair<dim>::fluid_force(const Continuum<dim> &continuum,
-                                                        const std::uint32_t node, const Vector &n,
-                                                        const double area, const double dt) const
+                                                        const SurfaceNodes &surface, const Vector &n,
+                                                        const double area) const
 {
   if (!continuum.is_saturated())
     return {0., 0.};
@@ -104,35 +207,63 @@ std::pair<double, double> ContactPair<dim>::fluid_force(const Continuum<dim> &co
     return {alpha * parameters.pressure * area, 0.};
   using S = Sums<dim>;
   const NodalFields<dim> &fields = continuum.fields();
-  const double *sum = &fields.sums[std::size_t(node) * fields.n_sums];
-  const double inertia = seepage_inertia ? sum[S::fluid_inertia] : 0.;
-  double force = 0.;
-  for (unsigned int d = 0; d < dim; ++d) {
-    const std::size_t row = std::size_t(node) * dim + d;
-    force += n[d] * (sum[S::pressure_force + d] + fields.pressure_load[row] +
-                     sum[S::fluid_inertia] * continuum.gravity()[d] - inertia * fields.acceleration[row]);
+  // Of all nodes that carry the interface: their sum is exact for hydrostatic pressures, where each alone is
+  // not.
+  double force = 0., per_impulse = 0.;
+  for (unsigned int k = 0; k < 3; ++k) {
+    if (surface.weight[k] == 0.)
+      continue;
+    const double *sum = &fields.sums[std::size_t(surface.node[k]) * fields.n_sums];
+    const double inertia = scheme.seepage_inertia ? sum[S::fluid_inertia] : 0.;
+    for (unsigned int d = 0; d < dim; ++d) {
+      const std::size_t row = std::size_t(surface.node[k]) * dim + d;
+      force += n[d] * (sum[S::pressure_force + d] + fields.pressure_load[row] +
+                       sum[S::fluid_inertia] * continuum.gravity()[d] - inertia * fields.acceleration[row]);
+    }
+    per_impulse += surface.weight[k] * inertia / (sum[S::mass] * step_length);
   }
-  const double m = continuum.mass(node);
-  return {alpha * force, m > 0. ? alpha * inertia / (m * dt) : 0.};
+  return {alpha * force, alpha * per_impulse};
 }
 
 template <int dim>
-void ContactPair<dim>::set_flux(Continuum<dim> &continuum, const std::uint32_t node, const Vector &n,
-                                const double area) const
+void ContactPair<dim>::note_flux(const Continuum<dim> &continuum, const SurfaceNodes &surface,
+                                 const Vector &n, const double area, NodalAdditions<dim> &noted) const
 {
   if (!continuum.is_saturated())
     return;
-  NodalFields<dim> &fields = continuum.fields();
-  double *w = &fields.flux[std::size_t(node) * dim];
-  double change = 0.;
-  if (parameters.interface == ContactParameters<dim>::Interface::impermeable)
-    for (unsigned int d = 0; d < dim; ++d)
-      change -= w[d] * n[d];
-  else if (const double resistance = fields.sums[std::size_t(node) * fields.n_sums + Sums<dim>::resistance];
-           resistance > 0.)
-    change = -parameters.pressure * area / resistance;
-  for (unsigned int d = 0; d < dim; ++d)
-    w[d] += change * n[d];
+  const NodalFields<dim> &fields = continuum.fields();
+  const auto resistance = [&](const unsigned int k) {
+    return fields.sums[std::size_t(surface.node[k]) * fields.n_sums + Sums<dim>::resistance];
+  };
+  double conductance = 0.;
+  for (unsigned int k = 0; k < 3; ++k)
+    if (surface.weight[k] > 0. && resistance(k) > 0.)
+      conductance += surface.weight[k] * surface.weight[k] / resistance(k);
+  if (conductance == 0.)
+    return;
+  // What acts on the interface from outside.
+  const double force = parameters.interface == ContactParameters<dim>::Interface::impermeable
+                           ? velocity(fields.flux, surface) * n / conductance
+                           : parameters.pressure * area;
+  for (unsigned int k = 0; k < 3; ++k)
+    if (surface.weight[k] > 0. && resistance(k) > 0.)
+      noted.note(surface.node[k], -force * surface.weight[k] / resistance(k) * n);
+}
+
+template <int dim>
+void ContactPair<dim>::change_flux(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const
+{
+  if (continuum.is_saturated())
+    noted.add_up(parallel,
+                 [&](const std::size_t row, const double change) { continuum.fields().flux[row] += change; });
+}
+
+template <int dim>
+void ContactPair<dim>::change_carrying_velocity(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const
+{
+  noted.add_up(parallel, [&](const std::size_t row, const double impulse) {
+    continuum.carrying_velocity()[row] += node_compliance(continuum, row / dim)[row % dim] * impulse;
+  });
 }
 
 template <int dim>

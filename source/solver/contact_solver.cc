@@ -150,7 +150,7 @@ void ContactSolver<dim>::solve(const double time, const double dt, Ledger<dim> &
       auto &force = continuum->fields().contact_force;
       std::fill(force.begin(), force.end(), 0.);
     }
-  for_each([&](auto &pair) { pair.begin(time, dt); });
+  for_each([&](auto &pair) { pair.begin(dt); });
   const auto &gravity = continua->front()->gravity();
   std::vector<dealii::Tensor<1, dim>> start;
   for (const auto &rigid : scene->rigid_bodies) {

@@ -287,6 +287,7 @@ template <int dim>
 void Continuum<dim>::solve_momentum()
 {
   using S = Sums<dim>;
+  const bool touches = !nodal.contact_force.empty(); // in the step before
   for (std::size_t i = 0; i < active.size(); ++i) {
     const double *sum = &nodal.sums[i * nodal.n_sums];
     const double m = sum[S::mass];
@@ -296,7 +297,8 @@ void Continuum<dim>::solve_momentum()
       const double v = nodal.velocity[row];
       double a =
           (sum[S::force + d] + (has_loads ? nodal.force[row] : 0.)) * inverse + gravity_now[d] * (m > 0.);
-      if (scheme.local_damping > 0.)
+      // What contact bears is no force out of balance.
+      if (scheme.local_damping > 0. && !(touches && nodal.contact_force[row] != 0.))
         a -= scheme.local_damping * std::copysign(a, v) * (v != 0.);
       nodal.acceleration[row] = a;
       nodal.new_velocity[row] = v + nodal.dt * a;

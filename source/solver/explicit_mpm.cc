@@ -5,14 +5,35 @@
 #include <sstream>
 
 namespace peat {
+namespace {
+template <int dim>
+std::vector<NodeId> with_neighbours(const Grid<dim> &grid, const std::vector<NodeId> &nodes)
+{
+  std::vector<NodeId> result = nodes;
+  for (const NodeId node : nodes)
+    for (unsigned int d = 0; d < dim; ++d)
+      for (const int step : {-1, 1}) {
+        auto lattice = grid.node_lattice(node);
+        lattice[d] += step;
+        if (lattice[d] < 0 || lattice[d] > grid.n_cells(d))
+          continue;
+        if (const NodeId neighbour = grid.node_at(lattice); neighbour != no_index)
+          result.push_back(neighbour);
+      }
+  std::sort(result.begin(), result.end());
+  result.erase(std::unique(result.begin(), result.end()), result.end());
+  return result;
+}
+} // namespace
+
 template <int dim>
 ExplicitMPM<dim>::ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &scene,
                               const double start_time, const Ledger<dim> &carried)
     : scheme(scheme), grid(grid), scene(scene), now(start_time), book(carried)
 {
-  for (const auto &bodies : scene.continua(grid.communicator()))
+  for (const auto &bodies : scene.continua)
     continua.push_back(std::make_unique<Continuum<dim>>(scheme, grid, scene, bodies));
-  if (continua.size() > 1)
+  if (!scene.contacts.empty())
     all_nodes = std::make_unique<ActiveNodes<dim>>(grid, static_cast<unsigned int>(scheme.basis));
   contact.reinit(scheme, grid, scene, continua);
 }
@@ -31,8 +52,8 @@ void ExplicitMPM<dim>::prepare()
     occupied.erase(std::unique(occupied.begin(), occupied.end()), occupied.end());
     all_nodes->rebuild(occupied);
     // Two continua may meet at a node of the partition's border with their points on different ranks: there
-    // each rank knows the node for all of them.
-    common = all_nodes->exchanged_nodes();
+    // each rank knows the node for all of them, and those next to it, between which the interface may lie.
+    common = with_neighbours(grid, all_nodes->exchanged_nodes());
   }
   for (const auto &continuum : continua)
     continuum->number_nodes(common);
@@ -62,15 +83,6 @@ void ExplicitMPM<dim>::step(const double dt)
   each([&](auto &continuum) { continuum.move_tracers(); });
   now += dt;
   relocate_points();
-}
-
-template <int dim>
-double ExplicitMPM<dim>::largest_speed() const
-{
-  double speed = 0.;
-  for (const auto &continuum : continua)
-    speed = std::max(speed, continuum->findings().largest_speed);
-  return speed;
 }
 
 template <int dim>

@@ -74,8 +74,10 @@ int Scene<dim>::body_at(const dealii::Point<dim> &x, const double tolerance) con
 }
 
 template <int dim>
-std::vector<std::vector<std::size_t>> Scene<dim>::continua(MPI_Comm communicator) const
+std::vector<std::vector<std::size_t>> find_continua(const Scene<dim> &scene, MPI_Comm communicator)
 {
+  const auto &bodies = scene.bodies;
+  const auto &contacts = scene.contacts;
   std::vector<std::size_t> root(bodies.size(), 0);
   if (!contacts.empty()) {
     std::iota(root.begin(), root.end(), 0);
@@ -121,4 +123,6 @@ std::vector<std::vector<std::size_t>> Scene<dim>::continua(MPI_Comm communicator
 
 template struct Scene<2>;
 template struct Scene<3>;
+template std::vector<std::vector<std::size_t>> find_continua<2>(const Scene<2> &, MPI_Comm);
+template std::vector<std::vector<std::size_t>> find_continua<3>(const Scene<3> &, MPI_Comm);
 } // namespace peat

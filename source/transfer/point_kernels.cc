@@ -438,10 +438,6 @@ void PointKernels<dim, reach, saturated>::deform_batch(
       if (healthy[l] > 0.)
         findings.finite = false;
     }
-  double fastest = 0.;
-  for (unsigned int l = 0; l < n_lanes; ++l)
-    fastest = std::max(fastest, speed_squared[l]);
-  findings.largest_speed = std::max(findings.largest_speed, fastest);
 }
 
 template <int dim, unsigned int reach, bool saturated>

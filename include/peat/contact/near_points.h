@@ -46,6 +46,15 @@ public:
   /// In the order of points, which is that of cells.
   const std::vector<Entry> &entries() const { return list; }
 
+  /// Points near the body's surface, by site, of all cells that the site's basis reaches: also those that are
+  /// too far from the node to have a weight there.
+  struct Neighbour
+  {
+    std::uint32_t site;
+    std::uint32_t point; ///< place in points()
+  };
+  const std::vector<Neighbour> &neighbours() const { return around; }
+
 private:
   struct Cell
   {
@@ -60,5 +69,6 @@ private:
   std::vector<Cell> cells;
   std::vector<PointData> data;
   std::vector<Entry> list;
+  std::vector<Neighbour> around;
 };
 } // namespace peat

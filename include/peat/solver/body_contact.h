@@ -15,7 +15,7 @@ public:
               std::vector<std::size_t> first_bodies, std::vector<std::size_t> second_bodies);
 
   void match_nodes() override;
-  void begin(double time, double dt) override;
+  void begin(double dt) override;
   double solve() override;
   void finish(Ledger<dim> &book) override;
   void mark_nodes(const Continuum<dim> &continuum, std::vector<char> &count) const override;
@@ -24,31 +24,41 @@ public:
 
 private:
   using Vector = typename ContactPair<dim>::Vector;
+  using ContactPair<dim>::sites;
 
   void find_normals();
   void find_gaps();
+  void find_surfaces();
+  /// Of bodies that are tied.
+  void take_all_nodes();
   /// Replace values of sites by their sums (or largest values) over ranks; `side` says whose nodes know them.
-  void add_over_ranks(std::vector<double> &values, unsigned int n_columns, const Continuum<dim> &side) const;
-  void max_over_ranks(std::vector<double> &values, const Continuum<dim> &side) const;
   template <typename Combine>
-  void over_ranks(std::vector<double> &values, unsigned int n_columns, const Continuum<dim> &side,
-                  const Combine &combine) const;
+  void over_ranks(std::vector<double> &values, unsigned int n_columns, unsigned int side,
+                  const Combine &combine);
+  void add_over_ranks(std::vector<double> &values, unsigned int n_columns, unsigned int side);
   std::vector<const Body<dim> *> pointers(const std::vector<std::size_t> &bodies) const;
   const Continuum<dim> &continuum(const unsigned int side) const { return side == 0 ? first : second; }
+  std::uint32_t node(const ContactSite<dim> &site, const unsigned int side) const
+  {
+    return side == 0 ? site.first : site.second;
+  }
+  bool has_mass(const ContactSite<dim> &site) const
+  {
+    return first.mass(site.first) > 0. && second.mass(site.second) > 0.;
+  }
 
-  const SchemeParameters &scheme;
-  const Grid<dim> &grid;
-  const Scene<dim> &scene;
   Continuum<dim> &first, &second;
   const std::vector<std::size_t> first_bodies, second_bodies;
-  const bool parallel;
-  double step_length = 0.;
 
-  std::vector<ContactSite<dim>> sites;
+  std::vector<std::uint32_t> site_of_node; ///< by the first continuum's nodes
   std::vector<dealii::Point<dim>> places;
   std::array<NearPoints<dim>, 2> near;
   std::array<std::vector<double>, 2> volume_gradient; ///< dim columns a site [m^(dim-1)]
+  std::array<std::vector<double>, 2> edge;  ///< how far a body reaches from the site towards the other [m]
+  std::array<std::vector<double>, 2> areas; ///< of the interface, by site
+  std::vector<double> both_areas;
+  std::array<NodalAdditions<dim>, 2> noted;
   SeparatingPlanes<dim> planes;
-  mutable std::vector<double> all_nodes; ///< scratch for sums over ranks
+  std::vector<double> nodal_values; ///< scratch for sums over ranks
 };
 } // namespace peat

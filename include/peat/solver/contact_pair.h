@@ -3,20 +3,36 @@
 #include <peat/contact/contact.h>
 #include <peat/contact/near_points.h>
 #include <peat/solver/continuum.h>
+#include <peat/solver/nodal_additions.h>
 
 namespace peat {
-/// A node at which two bodies may touch.
+/// How a continuum's surface moves at a contact site: with the mean velocity of neighbours on a line of the
+/// mesh, each weighted by the share of the surface that it carries. A pressure on the surface acts on them by
+/// the same shares.
+struct SurfaceNodes
+{
+  std::array<std::uint32_t, 3> node = {no_index, no_index, no_index};
+  std::array<double, 3> weight = {0., 0., 0.};
+};
+
+/// A place at which two bodies may touch.
 template <int dim>
 struct ContactSite
 {
-  std::uint32_t first;            ///< node of the first continuum; no_index if the first body is rigid
-  std::uint32_t second;           ///< node of the second continuum
-  bool counts;                    ///< this rank adds it to sums over sites
-  dealii::Point<dim> x;           ///< where forces act
-  dealii::Tensor<1, dim> normal;  ///< from the first body to the second
-  double gap;                     ///< between their surfaces [m]; negative if they overlap
-  double area;                    ///< of the interface [m^(dim-1)]
-  dealii::Tensor<1, dim> impulse; ///< of this step, on the second body [N s]
+  std::uint32_t first = no_index;  ///< the nearest node, of the first continuum; no_index of a rigid body
+  std::uint32_t second = no_index; ///< the same node, of the second continuum
+  bool counts = false;             ///< this rank handles it
+  bool acts = false;               ///< the interface is here
+  /// Places of the sites whose nodes move with this one's surface; itself first, no_index where there is
+  /// none.
+  std::array<std::uint32_t, 3> line;
+  SurfaceNodes first_surface, second_surface;
+  dealii::Point<dim> x;                     ///< where forces act
+  dealii::Tensor<1, dim> normal;            ///< from the first body to the second
+  double gap = 0.;                          ///< between their surfaces [m]; negative if they overlap
+  double area = 0.;                         ///< of the interface [m^(dim-1)]
+  double height = 0.;                       ///< of the interface above the nearest node, along the normal [m]
+  dealii::Tensor<1, dim> impulse;           ///< of this step, on the second body [N s]
   dealii::Tensor<1, dim> relative_velocity; ///< of the first body, at the start of the step [m/s]
 };
 
@@ -29,15 +45,14 @@ template <int dim>
 class ContactPair
 {
 public:
-  ContactPair(const ContactParameters<dim> &parameters, MPI_Comm communicator)
-      : parameters(parameters), communicator(communicator)
-  {}
+  ContactPair(const ContactParameters<dim> &parameters, const SchemeParameters &scheme, const Grid<dim> &grid,
+              const Scene<dim> &scene);
   virtual ~ContactPair() = default;
 
   /// The nodes of the continua have new numbers.
   virtual void match_nodes() = 0;
-  /// Find sites, normals and gaps as they are at the start of the step.
-  virtual void begin(double time, double dt) = 0;
+  /// Find sites, normals and gaps as they are at the start of a step of length dt.
+  virtual void begin(double dt) = 0;
   /// Find the impulses, given those of the other contacts. Returns the largest change of a velocity [m/s].
   virtual double solve() = 0;
   /// Sum up what the step did.
@@ -54,6 +69,7 @@ public:
 
 protected:
   using Vector = dealii::Tensor<1, dim>;
+  static constexpr double far = std::numeric_limits<double>::max();
 
   /// The impulse that the law allows.
   struct Response
@@ -68,26 +84,54 @@ protected:
   /// @param fluid_force part of the normal force that pore fluid bears: a constant [N], and what is added
   ///        per normal impulse [1/s]
   Response respond(const ContactSite<dim> &site, const Vector &relative, const Vector &compliance,
-                   const std::pair<double, double> &fluid_force, double dt) const;
+                   const std::pair<double, double> &fluid_force) const;
+
+  /// Of all sites with a gap and a normal, find those that act: one for each line of the mesh that meets the
+  /// interface, at the node that carries most of it; and the nodes of that line which carry the rest
+  /// (theory.md, contact). Each node belongs to one site at most.
+  /// @param nodes of one of the continua
+  /// @param node its numbers in the sites
+  /// @param areas of the interface, by site [m^(dim-1)]
+  void find_lines(const ActiveNodes<dim> &nodes, std::uint32_t ContactSite<dim>::*node,
+                  const std::vector<std::uint32_t> &site_of_node, const std::vector<double> &areas);
+  /// Weights by the areas that a continuum's nodes carry. Returns their sum.
+  double weigh(const ContactSite<dim> &site, std::uint32_t ContactSite<dim>::*node,
+               const std::vector<double> &areas, SurfaceNodes &surface) const;
 
   /// 1 / mass of a node, zero in components that a condition prescribes.
   static Vector node_compliance(const Continuum<dim> &continuum, std::uint32_t node);
-  static Vector node_velocity(const std::vector<double> &field, std::uint32_t node);
-  /// Give a node an impulse of this step.
-  static void push(Continuum<dim> &continuum, std::uint32_t node, const Vector &impulse, double dt);
+  /// Change of the surface's velocity by a unit impulse there.
+  static Vector compliance(const Continuum<dim> &continuum, const SurfaceNodes &surface);
+  static Vector velocity(const std::vector<double> &field, const SurfaceNodes &surface);
+  /// Note an impulse of this step on a surface; give_impulses() hands what was noted to the nodes.
+  void push(NodalAdditions<dim> &noted, const SurfaceNodes &surface, const Vector &impulse) const;
+  void give_impulses(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
   /// The force of the pore fluid on an interface with normal n out of the continuum: with the impulses that
-  /// the node has had [N], and what a further impulse along -n adds to it [1/s] (theory.md, contact).
-  std::pair<double, double> fluid_force(const Continuum<dim> &continuum, std::uint32_t node, const Vector &n,
-                                        double area, double dt) const;
-  /// What the interface makes of the flux at a node where bodies touch; n points out of the continuum.
-  void set_flux(Continuum<dim> &continuum, std::uint32_t node, const Vector &n, double area) const;
+  /// the nodes have had [N], and what a further impulse along -n adds to it [1/s] (theory.md, contact).
+  std::pair<double, double> fluid_force(const Continuum<dim> &continuum, const SurfaceNodes &surface,
+                                        const Vector &n, double area) const;
+  /// Note what the interface makes of the flux where bodies touch; n points out of the continuum.
+  void note_flux(const Continuum<dim> &continuum, const SurfaceNodes &surface, const Vector &n, double area,
+                 NodalAdditions<dim> &noted) const;
+  void change_carrying_velocity(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
+  void change_flux(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
   /// Biot's coefficient of the continuum's first saturated body.
   static double biot_coefficient(const Continuum<dim> &continuum, const Scene<dim> &scene);
 
   const ContactParameters<dim> &parameters;
+  const SchemeParameters &scheme;
+  const Grid<dim> &grid;
+  const Scene<dim> &scene;
   MPI_Comm communicator;
+  const bool parallel;
+  const double touching; ///< a gap that counts as closed [m]: round-off of coordinates
   ContactState<dim> now;
-  bool seepage_inertia = true;
+  double step_length = 0.;
   double alpha = 1.; ///< Biot's coefficient of the saturated side
+
+  std::vector<ContactSite<dim>> sites;
+
+private:
+  std::vector<std::uint32_t> owner_of_site; ///< the site whose line it is on
 };
 } // namespace peat

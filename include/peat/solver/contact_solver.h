@@ -22,8 +22,6 @@ public:
   void constrain_flux();
   void constrain_carrying_velocity();
 
-  const std::vector<std::unique_ptr<ContactPair<dim>>> &contacts() const { return pairs; }
-
 private:
   template <typename Action>
   void for_each(const Action &action);

@@ -25,14 +25,12 @@ public:
   StableStep stable_step() const;
   double time() const override { return now; }
   void set_time(const double time) override { now = time; }
-  double largest_speed() const;
   /// Of this stage; all zero with explicit pressures.
   PressureWork pressure_work() const;
   /// Of all bodies together.
   const ActiveNodes<dim> &nodes() const override;
   const NodalFields<dim> &fields() const override;
   const Ledger<dim> &ledger() const override { return book; }
-  const ContactSolver<dim> &contacts() const { return contact; }
 
 private:
   void relocate_points();
@@ -43,7 +41,7 @@ private:
   Scene<dim> &scene;
   std::vector<std::unique_ptr<Continuum<dim>>> continua;
   ContactSolver<dim> contact;
-  /// Of several continua: the nodes of all, and what pictures ask for on them.
+  /// Where there are contacts: the nodes of all, and what pictures ask for on them.
   std::unique_ptr<ActiveNodes<dim>> all_nodes;
   mutable NodalFields<dim> all_fields;
 

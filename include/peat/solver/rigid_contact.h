@@ -17,7 +17,7 @@ public:
                Continuum<dim> &continuum, std::vector<std::size_t> bodies, bool rigid_is_first);
 
   void match_nodes() override;
-  void begin(double time, double dt) override;
+  void begin(double dt) override;
   double solve() override;
   void finish(Ledger<dim> &book) override;
   void mark_nodes(const Continuum<dim> &continuum, std::vector<char> &count) const override;
@@ -30,29 +30,42 @@ private:
   using Generalised = typename RigidBody<dim>::Generalised;
   static constexpr unsigned int n_motions = RigidBody<dim>::n_motions;
 
-  void choose_nodes();
-  std::vector<dealii::Point<dim>> corners() const;
-  void find_gaps();
-  /// Impulses at all nodes if the rigid body moves like this; their wrench, and its derivatives with the
-  /// motion, over all ranks.
-  void respond_to(const Generalised &motion, std::vector<Response> &responses, std::vector<double> &wrench,
-                  std::vector<double> &slope) const;
-  Generalised find_motion(std::vector<Response> &responses) const;
+  using ContactPair<dim>::sites;
 
-  const SchemeParameters &scheme;
-  const Grid<dim> &grid;
-  const Scene<dim> &scene;
+  void choose_nodes();
+  std::array<dealii::Point<dim>, (1u << dim)> corners() const;
+  void find_gaps();
+  void find_surfaces();
+  /// Impulses at all sites if the rigid body moves like this; their wrench, and its derivatives with the
+  /// motion, over all ranks.
+  void respond_to(const Generalised &motion);
+  void find_motion();
+  double *values_of(const ContactSite<dim> &site) { return &sums[std::size_t(index_of(site)) * n_columns]; }
+  /// Where the site's sums over ranks stand.
+  std::size_t index_of(const ContactSite<dim> &site) const
+  {
+    return this->parallel ? site.second : site_of_node[site.second];
+  }
+
   RigidBody<dim> &rigid;
   Continuum<dim> &continuum;
   const std::vector<std::size_t> bodies;
   const double sign; ///< -1: reports are of the body, not of the rigid one
-  const bool parallel;
-  double step_length = 0.;
 
-  std::vector<ContactSite<dim>> sites;
   std::vector<std::uint32_t> site_of_node;
   NearPoints<dim> near;
   /// Where the corners of the rigid body's box were when the nodes were chosen.
-  std::vector<dealii::Point<dim>> corners_of_choice;
+  std::array<dealii::Point<dim>, (1u << dim)> corners_of_choice;
+
+  // Of a step, here to keep their memory.
+  std::vector<Vector> normals; ///< of the rigid body at the points near it
+  std::vector<double> distances;
+  std::vector<double> areas; ///< of the interface, by site
+  /// By index_of(): least distance of the body's points, negative; sums over them (see find_gaps()).
+  std::vector<double> nearest, sums;
+  static constexpr unsigned int n_columns = 1 + 3 * dim;
+  std::vector<Response> responses;
+  std::vector<double> wrench, slope;
+  NodalAdditions<dim> noted;
 };
 } // namespace peat

@@ -46,9 +46,14 @@ struct Scene
   /// The body whose shape contained the place at the start, or -1.
   int body_at(const dealii::Point<dim> &x, double tolerance) const;
 
-  /// Bodies (places in `bodies`) that move with one velocity field: those that touch each other at the start,
-  /// or are tied, without a contact that separates them; all, if there are no contacts. Throws an InputError
-  /// if a contact is to separate bodies that others tie together. Collective.
-  std::vector<std::vector<std::size_t>> continua(MPI_Comm communicator) const;
+  /// Bodies (places in `bodies`) that move with one velocity field.
+  std::vector<std::vector<std::size_t>> continua;
 };
+
+/// What Scene::continua is to be, of bodies with all their points where the parameter file puts them: bodies
+/// that touch each other, or are tied, without a contact that separates them, move as one; all do if there
+/// are no contacts. Throws an InputError if a contact is to separate bodies that others tie together.
+/// Collective.
+template <int dim>
+std::vector<std::vector<std::size_t>> find_continua(const Scene<dim> &scene, MPI_Comm communicator);
 } // namespace peat

@@ -25,7 +25,6 @@ struct Sums
 /// What the points' visits of one step find, over this rank's points.
 struct StepFindings
 {
-  double largest_speed = 0.;
   bool finite = true;
   double fluid_outflow = 0.; ///< sum V div w dt [m^dim]
   double fluid_squeezed =
