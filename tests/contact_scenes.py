@@ -249,7 +249,7 @@ def c3_rigid_roller(c):
 
 
 def c4(c):
-    theta, mu, rho, rho_f, h = radians(25.), 0.4, 1990., 1000., 0.125
+    theta, mu, rho, rho_f, h, top = radians(25.), 0.4, 1990., 1000., 0.125, 1.25
     laws = {"effective stress": (rho - rho_f) / rho, "total stress": 1.}
     exact = {law: G * (sin(theta) - mu * cos(theta) * r) for law, r in laws.items()}
     for law, r in laws.items():
@@ -266,7 +266,13 @@ def c4(c):
         other = next(e for name, e in exact.items() if name != law)
         c.above(law + ": acceleration against the other law", abs(a / other - 1.), 0.5)
         if law == "effective stress":
-            c.below(law + ": pressure", run.error("pressure", "L2"), 1e-2)
+            # Means of rows of cells in the middle third; the ends of the slab are not those of the infinite one.
+            rows = {}
+            for x, (p,) in zip(points["position"], points["pressure"]):
+                if left + (right - left) / 3. < x[0] < right - (right - left) / 3.:
+                    rows.setdefault(int(x[1] / h), []).append((p, rho_f * G * cos(theta) * (top - x[1])))
+            errors = [sum(p - e for p, e in row) / len(row) for row in rows.values()]
+            c.below(law + ": pressure", sqrt(sum(e * e for e in errors) / len(errors)) / (rho_f * G * cos(theta)), 1e-2)
 
 
 # --------------------------------------------------------------------------------------------------------- Hertz
@@ -548,17 +554,17 @@ CASES = {
     "C1": (c1, ("quick", "full"), 2),
     "C1_3d": (c1_3d, (), 3),
     "C2": (c2, ("quick", "full"), 3),
-    "C3_block": (c3_block, (), 5),
-    "C3_tilted": (c3_tilted, (), 10),
+    "C3_block": (c3_block, ("full",), 5),
+    "C3_tilted": (c3_tilted, ("full",), 10),
     "C3_tilted_ground": (lambda c: c3_tilted(c, "C3_tilted_ground"), (), 60),
     "C3_roller": (c3_roller, (), 100),
     "C3_rigid_roller": (c3_rigid_roller, (), 20),
-    "C4": (c4, (), 12),
+    "C4": (c4, ("full",), 12),
     "C5": (c5, (), 15),
     "C6": (lambda c: c6(c, 16), (), 100),
     "C7": (c7, (), 2),
     "I1": (i1, (), 5),
-    "I1_3d": (i1_3d, (), 2),
+    "I1_3d": (i1_3d, ("full",), 2),
     "I2": (i2, (), 3),
     "I2_3d": (i2_3d, ("quick", "full"), 2),
     "I3_discs": (i3_discs, (), 5),
