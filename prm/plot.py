@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """Pictures of an output directory without ParaView: plot.py DIR writes DIR/overview.png.
 
-Shows pore pressure (or vertical stress) at the points when it was largest, and the probes over time.
+Shows pore pressure (or vertical stress) at the points when it was largest, the probes over time, and
+the forces of contacts.
 """
 import base64
 import csv
@@ -41,41 +42,53 @@ def decode(array):
 
 
 def read_points(file_name):
-    """Positions and named fields of all pieces of a VTU file."""
-    positions, fields = [], {}
+    """Positions and named fields of all pieces of a VTU file; of a body that has no points yet, nothing."""
+    positions, fields = [np.empty((0, 3))], {}
     for piece in ElementTree.parse(file_name).getroot().iter("Piece"):
+        if piece.get("NumberOfPoints", "0") == "0":
+            continue
         positions.append(decode(piece.find("Points/DataArray")))
         for array in piece.findall("PointData/DataArray"):
             fields.setdefault(array.get("Name"), []).append(decode(array))
     return np.concatenate(positions), {name: np.concatenate(parts) for name, parts in fields.items()}
 
 
-def field_of(fields):
-    if "pressure" in fields:
-        return "pore pressure [kPa]", fields["pressure"][:, 0] / 1e3
+def field_of(fields, wet):
+    """Label and values of what is shown; None for a body that does not have it."""
+    if wet:
+        return "pore pressure [kPa]", fields["pressure"][:, 0] / 1e3 if "pressure" in fields else None
     stress = fields.get("effective_stress", fields.get("effective stress"))
-    return "vertical stress [kPa]", stress[:, 4 if stress.shape[1] == 9 else 1] / 1e3
+    return "vertical stress [kPa]", None if stress is None else stress[:, 4 if stress.shape[1] == 9 else 1] / 1e3
 
 
 def draw_points(axes, directory):
-    """The points of all bodies when the field was largest; in 3-D those near the plane of smallest y."""
+    """The points of all bodies when the field was largest; in 3-D those near the plane of smallest y. Bodies without the field,
+    and rigid ones, are grey."""
     frames = {}
     for entry in ElementTree.parse(os.path.join(directory, "solution.pvd")).getroot().iter("DataSet"):
         if entry.get("part") != "0":
             frames.setdefault(float(entry.get("timestep")), []).append(os.path.join(directory, entry.get("file")))
-    best = None
-    for time, files in frames.items():
-        parts = [read_points(name) for name in files]
-        label, _ = field_of(parts[0][1])
-        x = np.concatenate([position for position, _ in parts])
-        value = np.concatenate([field_of(fields)[1] for _, fields in parts])
-        if best is None or np.abs(value).max() > np.abs(best[3]).max():
-            best = (time, label, x, value)
-    time, label, x, value = best
-    flat = np.ptp(x[:, 2]) == 0
-    across = x[:, 2 if flat else 1]
-    front = across < across.min() + 0.02 * (np.ptp(across) or 1) + 1e-12 if not flat else np.ones(len(x), bool)
-    picture = axes.scatter(x[front, 0], x[front, 1 if flat else 2], c=value[front], s=10, marker="s", cmap="viridis", linewidths=0)
+    bodies = {time: [part for part in map(read_points, files) if len(part[0])] for time, files in frames.items()}
+    wet = any("pressure" in fields for parts in bodies.values() for _, fields in parts)
+
+    def largest(parts):
+        values = [field_of(fields, wet)[1] for _, fields in parts]
+        return max((np.abs(v).max() for v in values if v is not None), default=0.)
+
+    time, parts = max(bodies.items(), key=lambda item: largest(item[1]))
+    flat = all(np.ptp(x[:, 2]) == 0 for x, _ in parts)
+    across = np.concatenate([x[:, 2 if flat else 1] for x, _ in parts])
+    limit = np.inf if flat else across.min() + 0.02 * (np.ptp(across) or 1) + 1e-12
+    limits = largest(parts)
+    for x, fields in parts:
+        label, value = field_of(fields, wet)
+        front = x[:, 2 if flat else 1] < limit
+        place = x[front, 0], x[front, 1 if flat else 2]
+        if value is None:
+            axes.scatter(*place, c="0.6", s=6, marker="s", linewidths=0)
+        else:
+            picture = axes.scatter(*place, c=value[front], s=10, marker="s", cmap="viridis", linewidths=0,
+                                   vmin=min(0., value.min()), vmax=max(0., value.max(), 1e-9 * limits))
     axes.figure.colorbar(picture, ax=axes, label=label)
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
@@ -83,11 +96,33 @@ def draw_points(axes, directory):
     axes.set_title("t = %.4g s" % time)
 
 
-def draw_probes(axes, directory, quantity, factor, unit):
-    with open(os.path.join(directory, "probes.csv"), newline="") as file:
+def read_columns(file_name):
+    with open(file_name, newline="") as file:
         rows = list(csv.reader(file))
-    names = rows[0]
-    data = np.array([[float(v) if v else np.nan for v in row] for row in rows[1:]])
+
+    def number(text):
+        try:
+            return float(text)
+        except ValueError:
+            return np.nan
+
+    return rows[0], np.array([[number(v) for v in row] for row in rows[1:]])
+
+
+def draw_forces(axes, names, data):
+    """The normal force of each contact, its mean over a fiftieth of the run."""
+    width = max(1, len(data) // 50)
+    for column, name in enumerate(names):
+        if name.endswith("/normal force [N]"):
+            force = np.nan_to_num(data[:, column]) / 1e3
+            axes.plot(data[:, 0], np.convolve(force, np.ones(width) / width, mode="same"), label=name.split("/")[0])
+    axes.set_xlabel("t [s]")
+    axes.set_ylabel("normal force [kN]")
+    axes.grid(alpha=0.3)
+    axes.legend()
+
+
+def draw_probes(axes, names, data, quantity, factor, unit):
     for column, name in enumerate(names):
         probe, _, field = name.rpartition("/")
         if field.startswith(quantity):
@@ -102,13 +137,17 @@ def main():
     if len(sys.argv) != 2:
         sys.exit(__doc__)
     directory = sys.argv[1]
-    figure, axes = plt.subplots(3, 1, figsize=(9, 12), gridspec_kw={"height_ratios": [2, 1, 1]})
+    names, probes = read_columns(os.path.join(directory, "probes.csv"))
+    columns, statistics = read_columns(os.path.join(directory, "statistics.csv"))
+    touches = any(name.endswith("/normal force [N]") for name in columns)
+    ratios = [2, 1, 1, 1] if touches else [2, 1, 1]
+    figure, axes = plt.subplots(len(ratios), 1, figsize=(9, 3 * sum(ratios)), gridspec_kw={"height_ratios": ratios})
     draw_points(axes[0], directory)
-    with open(os.path.join(directory, "probes.csv")) as file:
-        header = file.readline()
-    vertical = "displacement z" if "displacement z" in header else "displacement y"
-    draw_probes(axes[1], directory, "pressure" if "/pressure" in header else "effective stress yy", 1e-3, "kPa")
-    draw_probes(axes[2], directory, vertical, 1e3, "mm")
+    has = lambda field: any(name.rpartition("/")[2].startswith(field) for name in names)
+    draw_probes(axes[1], names, probes, "pressure" if has("pressure") else "effective stress yy", 1e-3, "kPa")
+    draw_probes(axes[2], names, probes, "displacement z" if has("displacement z") else "displacement y", 1e3, "mm")
+    if touches:
+        draw_forces(axes[3], columns, statistics)
     figure.tight_layout()
     figure.savefig(os.path.join(directory, "overview.png"), dpi=110)
 
