@@ -34,8 +34,8 @@ def d3(c):
             c.below("k = %g: displacement of the top for t >= 0.1 s, Linf" % k,
                     runs[-1].error("displacement of the top", "Linf"), 1e-2)
             c.order("k = %g: pressure at 0.4 s" % k, sizes, [r.errors_at_times("pressure")[-1] for r in runs], 1.8)
-        # h/c_hf at 0.8, whatever the permeability; the explicit step needs 170,000, 17,000 and 7,000.
-        c.below("k = %g: steps" % k, runs[-1].summary["steps"], 1000)
+        # 0.8 h/c_hf with the allowance for slivers, whatever the permeability; the explicit step needs 170,000, 17,000 and 7,000.
+        c.below("k = %g: steps" % k, runs[-1].summary["steps"], 1250)
         c.below("k = %g: fluid mass" % k, runs[-1].summary["balance"]["fluid_mass"], 1e-12)
         c.below("k = %g: momentum" % k, runs[-1].summary["balance"]["momentum"], 1e-12)
 
@@ -97,11 +97,11 @@ def rest(c):
 
 
 def limit(c):
-    """In permeable soil the largest step is h/c_hf; the automatic one also allows for slivers, by a factor of sqrt(2)."""
+    """In permeable soil the largest step is h/c_hf; the automatic one also allows for slivers, by a factor of sqrt(3)."""
     for share, stable in (0.97, True), (1.04, False):
         run = c.run("N1_timestep", dict(IMPLICIT, **{
             "Constants/k": 1e-2, "Constants/End": 3, "Output/Statistics interval": 3,
-            "Explicit MPM/Step factor": share * 2.**0.5}), may_fail=True)
+            "Explicit MPM/Step factor": share * 3.**0.5}), may_fail=True)
         speed = run.table("statistics.csv")["largest speed"]
         # It begins with 1e-6 m/s, and is damped.
         c.note("step %g h/c_hf is %s" % (share, "stable" if stable else "unstable"), (speed[-1] < 1e-6) == stable,
