@@ -24,7 +24,7 @@ from stress_judge import alternation, judge
 from stress_matrix import all_cases, few_cases
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-SECONDS = 120
+SECONDS = 60
 NUMBERS = ("energy", "energy at the end", "momentum", "fluid mass", "checkerboard")
 
 

@@ -69,7 +69,7 @@ class Case:
             settings["transits"] *= 8
         if self.too_large:
             settings["transits"] *= 10
-        elif settings.get("pore pressure") != "implicit":
+        if settings.get("pore pressure") != "implicit":
             settings["transits"] *= min(1.0, MOST_STEPS / self.diffusive_steps(settings["transits"]))
         words = []
         for key, value in settings.items():
