@@ -69,15 +69,29 @@ std::vector<std::string> chosen_references(const Case<dim> &parameters)
   return sweep.references.empty() ? known : sweep.references;
 }
 
+/// Each reason once, with the first combination and the number of the others.
 void list_refused(const std::vector<SweepRun> &runs, const std::vector<SweepAxis> &axes, Log &log)
 {
-  for (const SweepRun &run : runs) {
-    if (run.state != SweepRun::State::refused)
-      continue;
-    std::string settings;
-    for (std::size_t a = 0; a < axes.size(); ++a)
-      settings += (a > 0 ? "; " : "") + axes[a].name() + '=' + run.values[a];
-    log.line("refused: " + settings + ": " + run.reason);
+  std::vector<std::string> reasons;
+  for (const SweepRun &run : runs)
+    if (run.state == SweepRun::State::refused &&
+        std::find(reasons.begin(), reasons.end(), run.reason) == reasons.end())
+      reasons.push_back(run.reason);
+  for (const std::string &reason : reasons) {
+    std::string first;
+    unsigned int n_others = 0;
+    for (const SweepRun &run : runs) {
+      if (run.state != SweepRun::State::refused || run.reason != reason)
+        continue;
+      if (!first.empty()) {
+        ++n_others;
+        continue;
+      }
+      for (std::size_t a = 0; a < axes.size(); ++a)
+        first += (a > 0 ? "; " : "") + axes[a].name() + '=' + run.values[a];
+    }
+    log.line("refused: " + first + (n_others > 0 ? " and " + std::to_string(n_others) + " more: " : ": ") +
+             reason);
   }
 }
 
