@@ -16,7 +16,7 @@ constexpr std::size_t most_runs = 10000;
 constexpr double seconds_a_step = 2e-5;
 constexpr double seconds_a_point_and_step = 3e-7;
 constexpr double pressure_solve_factor = 4.;
-constexpr double seconds_an_unknown_and_solve = 3e-5;
+constexpr double seconds_an_unknown_and_solve = 1e-5;
 constexpr double quasi_static_steps = 100.;
 constexpr double lines_a_stage = 200.;
 
