@@ -32,19 +32,28 @@ std::string history_file(const SweepData &data, const SweepRun &run)
   return data.directory + "/runs/" + run.name + "/probes.csv";
 }
 
-/// Largest relative difference of the components of each chosen quantity at each probe.
+/// Largest difference of the components of each chosen quantity at each probe, over the size of the quantity
+/// at the probe where that is largest: a pressure that is zero at a drained surface is not measured against
+/// itself.
 std::map<std::string, double> largest_differences(const std::vector<Difference> &differences,
                                                   const std::vector<std::string> &fields, const bool largest)
 {
-  std::map<std::string, double> result;
-  for (const Difference &difference : differences) {
-    const std::string quantity = quantity_of(difference.field);
-    const double relative = largest ? difference.relative_Linf : difference.relative_L2;
-    if (std::find(fields.begin(), fields.end(), quantity) == fields.end() || !std::isfinite(relative))
-      continue;
-    double &error = result[quantity + " at " + difference.name];
-    error = std::max(error, relative);
-  }
+  const auto is_wanted = [&](const Difference &difference) {
+    return difference.n > 0 && !difference.negligible &&
+           std::find(fields.begin(), fields.end(), quantity_of(difference.field)) != fields.end();
+  };
+  std::map<std::string, double> scales, result;
+  for (const Difference &difference : differences)
+    if (is_wanted(difference)) {
+      double &scale = scales[quantity_of(difference.field)];
+      scale = std::max(scale, largest ? difference.scale_Linf : difference.scale_L2);
+    }
+  for (const Difference &difference : differences)
+    if (is_wanted(difference)) {
+      const std::string quantity = quantity_of(difference.field);
+      double &error = result[quantity + " at " + difference.name];
+      error = std::max(error, (largest ? difference.Linf : difference.L2) / scales[quantity]);
+    }
   return result;
 }
 } // namespace
