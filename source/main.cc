@@ -5,7 +5,11 @@
 
 #include <deal.II/base/mpi.h>
 
+#include <algorithm>
+#include <cmath>
 #include <iostream>
+#include <string>
+#include <vector>
 
 namespace {
 using namespace peat;
@@ -16,6 +20,7 @@ const char *const usage =
 
   peat run CASE.prm           run a case (also: peat CASE.prm; mpirun -np N peat run CASE.prm)
   peat compare CASE.prm       run it with two methods or settings and report where the results differ
+  peat sweep CASE.prm         run it with all combinations of some settings: error against run time
   peat check CASE.prm         validate a case and say what it would take; runs nothing
   peat parameters             every parameter with meaning, unit, default and range
 )";
@@ -24,6 +29,7 @@ struct CommandLine
 {
   std::string command;
   RunOptions run;
+  SweepOptions sweep;
   std::string format = "prm";
   unsigned int dimension = 2;
 };
@@ -38,6 +44,11 @@ bool parse(const int argc, char **argv, const bool first_rank, CommandLine &line
                         "override an entry of the file; repeatable")(
       "output", options::value(&line.run.output)->value_name("DIR"), "directory for results (output/CASE)")(
       "quiet", options::bool_switch(&line.run.quiet), "say nothing on the terminal but errors")(
+      "vary", options::value(&line.sweep.vary)->composing()->value_name("\"Section/Key=a,b\""),
+      "of 'peat sweep': values of an entry; repeatable, all combinations are run")(
+      "target", options::value(&line.sweep.target)->value_name("ERROR"),
+      "of 'peat sweep': relative error to look for (1e-2)")(
+      "jobs", options::value(&line.sweep.n_jobs)->value_name("N"), "of 'peat sweep': runs at a time (1)")(
       "format", options::value(&line.format)->value_name("prm|markdown|json"),
       "of 'peat parameters'")("dimension", options::value(&line.dimension)->value_name("2|3"),
                               "of 'peat parameters'")("help", "this text")("version", "the version");
@@ -67,10 +78,18 @@ bool parse(const int argc, char **argv, const bool first_rank, CommandLine &line
   if (values.count("output") && line.run.output.empty())
     throw InputError("'--output' needs the name of a directory");
   const std::string &first = words.front();
-  const bool is_command = first == "run" || first == "compare" || first == "check" || first == "parameters";
+  const std::vector<std::string> commands = {"run", "compare", "sweep", "check", "parameters"};
+  const bool is_command = std::find(commands.begin(), commands.end(), first) != commands.end();
   line.command = is_command ? first : "run";
   if (!is_command && (first.size() < 4 || first.substr(first.size() - 4) != ".prm"))
     throw InputError("'" + first + "' is no command and no parameter file (.prm); see peat --help");
+  for (const char *option : {"vary", "target", "jobs"})
+    if (values.count(option) && line.command != "sweep")
+      throw InputError("'--" + std::string(option) + "' is for 'peat sweep'");
+  if (values.count("target") && !(line.sweep.target > 0. && std::isfinite(line.sweep.target)))
+    throw InputError("'--target' must be a relative error > 0");
+  if (values.count("jobs") && (line.sweep.n_jobs < 1 || line.sweep.n_jobs > 1000))
+    throw InputError("'--jobs' must be >= 1 and <= 1000");
   const std::size_t n_words = is_command ? 2 : 1;
   if (line.command == "parameters") {
     if (words.size() > 1)
@@ -105,6 +124,10 @@ int main(int argc, char **argv)
       return exit_success;
     if (line.command == "parameters")
       return first_rank ? command_parameters(line.format, line.dimension) : exit_success;
+    if (line.command == "sweep") {
+      line.sweep.run = line.run;
+      return command_sweep(line.sweep, communicator);
+    }
     if (line.command == "compare")
       return command_compare(line.run, communicator);
     return line.command == "check" ? command_check(line.run, communicator)

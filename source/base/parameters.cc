@@ -1,3 +1,4 @@
+#include <peat/base/invalid_value.h>
 #include <peat/base/parameters.h>
 #include <peat/base/text.h>
 
@@ -45,12 +46,22 @@ std::string shown(const std::string &text, const double value)
   return to_text(value) == text ? text : in_quotes(text) + " = " + to_text(value);
 }
 
+/// As Section::fail(), for what is wrong whatever the rest of the file says.
+[[noreturn]] void refuse(const Section &section, const std::string &key, const std::string &message)
+{
+  try {
+    section.fail(key, message);
+  } catch (const InputError &error) {
+    throw InvalidValue(error.what());
+  }
+}
+
 double evaluate(const Section &section, const std::string &key, const std::string &text)
 {
   try {
     return evaluate(text, section.constants(), Origin());
   } catch (const InputError &error) {
-    section.fail(key, error.what());
+    refuse(section, key, error.what());
   }
 }
 
@@ -58,8 +69,8 @@ void check_range(const Section &section, const std::string &key, const std::stri
                  const Range &range)
 {
   if (!contains(range, value))
-    section.fail(key, shown(text, value) + " must be " + describe(range) +
-                          (range.unit.empty() ? "" : " " + range.unit));
+    refuse(section, key,
+           shown(text, value) + " must be " + describe(range) + (range.unit.empty() ? "" : " " + range.unit));
 }
 
 double read_number(const Section &section, const std::string &key, const std::string &text,
@@ -75,7 +86,7 @@ std::vector<std::string> read_list(const Section &section, const std::string &ke
   const std::vector<std::string> parts = split_outside_parentheses(text);
   for (const std::string &part : parts)
     if (part.empty())
-      section.fail(key, "a comma with nothing before or after it in " + in_quotes(text));
+      refuse(section, key, "a comma with nothing before or after it in " + in_quotes(text));
   return parts;
 }
 
@@ -88,7 +99,7 @@ std::string read_choice(const Section &section, const std::string &key, const st
                         const std::vector<std::string> &choices)
 {
   if (!is_one_of(choices, word))
-    section.fail(key, in_quotes(word) + " is none of " + in_quotes(choices) + did_you_mean(word, choices));
+    refuse(section, key, in_quotes(word) + " is none of " + in_quotes(choices) + did_you_mean(word, choices));
   return word;
 }
 } // namespace
@@ -123,11 +134,11 @@ void Section::add(const std::string &key, unsigned int &value, const Range &rang
     const double number = evaluate(*this, key, given->value);
     const double rounded = std::round(number);
     if (std::abs(number - rounded) > 1e-9)
-      fail(key, shown(given->value, number) + " must be a whole number");
+      refuse(*this, key, shown(given->value, number) + " must be a whole number");
     // Rounded first: 0.3 / 0.1 is a little less than 3.
     check_range(*this, key, given->value, rounded, whole);
     if (rounded > std::numeric_limits<unsigned int>::max())
-      fail(key, shown(given->value, number) + " is too large");
+      refuse(*this, key, shown(given->value, number) + " is too large");
     value = static_cast<unsigned int>(rounded);
     entry.value = std::to_string(value);
   }
@@ -179,8 +190,9 @@ void Section::add(const std::string &key, std::vector<double> &value, const unsi
   if (const PrmEntry *const given = node->given(key)) {
     const std::vector<std::string> parts = read_list(*this, key, given->value);
     if (n_values > 0 && parts.size() != n_values)
-      fail(key, std::to_string(n_values) + " numbers separated by commas are needed, not " +
-                    std::to_string(parts.size()));
+      refuse(*this, key,
+             std::to_string(n_values) + " numbers separated by commas are needed, not " +
+                 std::to_string(parts.size()));
     value.clear();
     for (const std::string &part : parts)
       value.push_back(read_number(*this, key, part, range));
@@ -227,12 +239,12 @@ void Section::add(const std::string &key, Function &value, const unsigned int n_
     try {
       value = Function(given->value, constants(), given->origin);
     } catch (const InputError &error) {
-      fail(key, std::string(error.what()).substr(given->origin.prefix().size()));
+      refuse(*this, key, std::string(error.what()).substr(given->origin.prefix().size()));
     }
     if (value.n_components() != n_components)
-      fail(key, std::to_string(n_components) + (n_components == 1 ? " component is" : " components are") +
-                    " needed, but " + in_quotes(given->value) + " has " +
-                    std::to_string(value.n_components()));
+      refuse(*this, key,
+             std::to_string(n_components) + (n_components == 1 ? " component is" : " components are") +
+                 " needed, but " + in_quotes(given->value) + " has " + std::to_string(value.n_components()));
     if (tree->dimension == 2 && value.depends_on("z"))
       fail(key, "there is no z in 2-D; the vertical axis is y");
     entry.value = value.text();

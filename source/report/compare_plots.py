@@ -1,29 +1,10 @@
 """The plots of the page: each function returns a figure, or None if there is nothing to show."""
-import base64
-import io
-
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 
 from compare_data import scale
+from page import plt
 
 FIRST, SECOND, REFERENCE = "#1f6fb4", "#d1495b", "#222222"
-plt.rcParams.update({
-    "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.alpha": 0.25,
-    "axes.titlesize": 9.5, "axes.titleweight": "bold", "legend.frameon": False, "legend.fontsize": 8.5,
-    "axes.formatter.useoffset": False, "axes.formatter.limits": (-3, 4), "svg.fonttype": "path", "figure.dpi": 130,
-})
-
-
-def image(figure, text):
-    """The figure as an <img> with everything in it."""
-    stream = io.BytesIO()
-    figure.savefig(stream, format="svg", bbox_inches="tight")
-    plt.close(figure)
-    return '<img alt="%s" src="data:image/svg+xml;base64,%s">' % (text, base64.b64encode(stream.getvalue()).decode())
 
 
 def legend_above(figure, handles, labels, n_columns=6):

@@ -230,7 +230,8 @@ Case<dim>::Case(const ParameterFile &file)
       probes(read_list<ProbeParameters<dim>>(file.root().subsection("Probes"), "PROBE")),
       references(read_list<ReferenceParameters<dim>>(file.root().subsection("References"), "REFERENCE",
                                                      names(probes))),
-      output(file.root().subsection("Output")), compare(file.root().subsection("Compare"))
+      output(file.root().subsection("Output")), compare(file.root().subsection("Compare")),
+      sweep(file.root().subsection("Sweep"))
 {
   if (file.root().describing())
     return;

@@ -1,9 +1,9 @@
 #include "compare_output.h"
 
+#include "result_files.h"
+
 #include <peat/base/error.h>
 #include <peat/simulation/table.h>
-
-#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -20,47 +20,6 @@ using json = nlohmann::ordered_json;
 constexpr double most_samples = 2e6;
 /// Vertical lines that the page shows.
 constexpr std::size_t most_lines = 3;
-
-/// JSON knows no NaN.
-json number(const double x)
-{
-  return std::isfinite(x) ? json(x) : json(nullptr);
-}
-
-std::string csv_number(const double x, const char *pattern = "%.10g")
-{
-  if (!std::isfinite(x))
-    return "";
-  char text[40];
-  std::snprintf(text, sizeof(text), pattern, x);
-  return text;
-}
-
-/// A file in the comparison's directory that is complete once it has its name.
-class ReplacedFile
-{
-public:
-  explicit ReplacedFile(const std::string &name) : name(name), stream(name + ".tmp") {}
-  std::ofstream &operator*() { return stream; }
-  void close()
-  {
-    stream.close();
-    if (!stream || std::rename((name + ".tmp").c_str(), name.c_str()) != 0)
-      throw NumericalError("cannot write '" + name + "'");
-  }
-
-private:
-  const std::string name;
-  std::ofstream stream;
-};
-
-std::string join_csv(const std::vector<std::string> &entries)
-{
-  std::string line;
-  for (const std::string &entry : entries)
-    line += (line.empty() ? "" : ",") + csv_entry(entry);
-  return line;
-}
 } // namespace
 
 bool Sights::see(const std::array<std::size_t, 3> &lattice, const unsigned int dimension) const
@@ -334,10 +293,10 @@ json read_json(const std::string &path)
 
 json describe(const Difference &d, const double tolerance)
 {
-  return {{"relative_L2", number(d.relative_L2)},
-          {"relative_Linf", number(d.relative_Linf)},
-          {"L2", number(d.L2)},
-          {"Linf", number(d.Linf)},
+  return {{"relative_L2", json_number(d.relative_L2)},
+          {"relative_Linf", json_number(d.relative_Linf)},
+          {"L2", json_number(d.L2)},
+          {"Linf", json_number(d.Linf)},
           {"unit", d.unit},
           {"compared", d.n},
           {"left_out", d.n_left_out},

@@ -1,6 +1,7 @@
 #include <peat/simulation/log.h>
 
 #include <peat/base/error.h>
+#include <peat/base/text.h>
 
 #include <cstdio>
 #include <iostream>
@@ -41,25 +42,43 @@ void Log::line(const std::string &text)
     std::cout << text << std::endl;
 }
 
-void Log::progress(const double fraction, const double time, const unsigned long step,
-                   const double point_steps_per_second)
+bool Log::is_due()
 {
   if (!active || quiet)
-    return;
+    return false;
   const auto now = std::chrono::steady_clock::now();
   if (now - last_progress < std::chrono::milliseconds(terminal ? 500 : 10000))
-    return;
+    return false;
   last_progress = now;
-  const double elapsed = std::chrono::duration<double>(now - start).count();
-  char text[160];
-  std::snprintf(text, sizeof(text), "%5.1f %%  t = %.4g s  step %lu  %.1f million point-steps/s  %s to go",
-                100. * fraction, time, step, 1e-6 * point_steps_per_second,
-                fraction > 0. ? readable_duration(elapsed * (1. - fraction) / fraction).c_str() : "?");
+  return true;
+}
+
+void Log::show(const std::string &text)
+{
   if (terminal)
     std::cout << "\r\033[K" << text << std::flush;
   else
     std::cout << text << std::endl;
   progress_shown = true;
+}
+
+void Log::progress(const double fraction, const double time, const unsigned long step,
+                   const double point_steps_per_second)
+{
+  if (!is_due())
+    return;
+  const double elapsed = std::chrono::duration<double>(last_progress - start).count();
+  char text[160];
+  std::snprintf(text, sizeof(text), "%5.1f %%  t = %.4g s  step %lu  %.1f million point-steps/s  %s to go",
+                100. * fraction, time, step, 1e-6 * point_steps_per_second,
+                fraction > 0. ? readable_duration(elapsed * (1. - fraction) / fraction).c_str() : "?");
+  show(text);
+}
+
+void Log::status(const std::string &text)
+{
+  if (terminal && is_due())
+    show(shortened(text, 160));
 }
 
 std::string readable_duration(const double seconds)

@@ -37,6 +37,11 @@ void catch_signals()
   std::signal(SIGTERM, note);
 }
 
+bool signal_was_caught()
+{
+  return signal_received != 0;
+}
+
 std::string default_output_directory(const std::string &file_name)
 {
   return "output/" + std::filesystem::path(file_name).stem().string();
@@ -100,7 +105,7 @@ bool Simulation<dim>::interrupted()
 {
   // Ranks receive signals at different moments; they ask each other now and then.
   if (dealii::Utilities::MPI::n_mpi_processes(communicator) == 1)
-    return signal_received != 0;
+    return signal_was_caught();
   return steps.n_steps % 50 == 0 && dealii::Utilities::MPI::max(int(signal_received), communicator) != 0;
 }
 

@@ -196,6 +196,48 @@ void Simulation<dim>::report_work(const PressureWork &work)
   log.line(text.str());
 }
 
+namespace {
+/// Energy above the work that went in, as a share of the largest energy so far.
+template <int dim>
+double made_energy(const Balances<dim> &balances)
+{
+  return balances.numerical_dissipation < 0. ? balances.energy_error : 0.;
+}
+
+std::string above_the_limit(const SchemeParameters &scheme)
+{
+  std::ostringstream text;
+  text << "; 'Step factor' " << scheme.step_factor << " is above the stable step, take 1 at most";
+  return text.str();
+}
+
+/// A step that says so if it fails because it is above the stable one.
+template <int dim>
+void step_within(ExplicitMPM<dim> &solver, const SchemeParameters &scheme, const double dt)
+{
+  try {
+    solver.step(dt);
+  } catch (const NumericalError &error) {
+    if (scheme.step_factor <= 1. || scheme.fixed_step > 0.)
+      throw;
+    throw NumericalError(error.what() + above_the_limit(scheme));
+  }
+}
+
+/// Above the stable step points may stay where they are and yet take energy from nowhere.
+template <int dim>
+void check_step_factor(const SchemeParameters &scheme, const Balances<dim> &balances, const double time)
+{
+  constexpr double most = 0.05;
+  const double made = made_energy(balances);
+  if (scheme.step_factor <= 1. || scheme.fixed_step > 0. || made <= most)
+    return;
+  std::ostringstream message;
+  message << "by t = " << time << " s the scheme has made energy, " << 100. * made << " % of the largest";
+  throw NumericalError(message.str() + above_the_limit(scheme));
+}
+} // namespace
+
 template <int dim>
 void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const double start)
 {
@@ -235,7 +277,7 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
     const unsigned int n_now = std::min<double>(n_steps, steps_between_checks - steps_since_check);
     const bool reaches_event = n_now == n_steps;
     for (unsigned int i = 0; i < n_now && !stopped; ++i) {
-      mpm.step(dt);
+      step_within(mpm, stage_scheme, dt);
       steps.add(dt);
       events.note(mpm.time(), dt, scene);
       ++steps_since_check;
@@ -249,12 +291,20 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
       mpm.set_time(now);
     }
     report(now, stopped || now >= end);
+    check_step_factor(stage_scheme, *balances, now);
     clock = seconds();
     wall.output += clock - lap;
     log.progress(now / planned_end, now, steps.n_steps,
                  steps.n_steps * double(scene.n_global_points()) / std::max(1e-9, wall.time_loop));
   }
   events.summarise(scene);
+  constexpr double worth_a_word = 0.05;
+  if (made_energy(*balances) > worth_a_word) {
+    std::ostringstream message;
+    message << "attention: the scheme has made energy, " << 100. * made_energy(*balances)
+            << " % of the largest (energy error in statistics.csv); see doc/stability.md";
+    log.line(message.str());
+  }
   report_work(mpm.pressure_work());
 }
 

@@ -14,6 +14,10 @@ struct Limits
   bool small_piece = false;
 };
 
+/// Material that only just reaches into a cell counts as at least this share of its volume: its stay there is
+/// short, and a step that follows its distance from the face to zero would stop the run.
+constexpr double least_part = 0.25;
+
 /// Factors by which slivers of material, which a node may have to move alone, reduce the limits of full
 /// cells.
 struct SliverFactors
@@ -27,15 +31,20 @@ struct SliverFactors
 /// largest squared frequency 4 c^2/h^2, whatever the length that sticks out, and likewise D/(l h) to the
 /// largest rate 4 D/h^2. The velocity of a node with hardly any mass does not outlive the step: its points do
 /// not feel it. So its part of the motion is not a wave, stable to (omega dt)^2 = 4, but a relaxation, stable to
-/// 2, and counts twice. Q1: fitted to the spectral radius of columns whose last cell is filled in part.
+/// 2, and counts twice. Q1: fitted to the spectral radius of columns whose last cell is filled in part; of a cell
+/// that is filled in part counts what its material weighs at the nodes with the least of it.
 template <int dim>
 SliverFactors sliver_factors(const Body<dim> &body, const Slice &slice, const Grid<dim> &grid)
 {
   const Layout &layout = body.layout();
   double volume = 0., domain = 1.;
+  dealii::Tensor<1, dim> first_moment; // of volume, about the lower corner of the cell, in its edges
   for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
     const double *row = body.row(body.handles()[i]);
     volume += row[layout.volume];
+    const auto &x = body.position(body.handles()[i]);
+    for (unsigned int d = 0; d < dim; ++d)
+      first_moment[d] += row[layout.volume] * (x[d] - grid.lower(slice.cell, d)) / grid.size(slice.cell, d);
     for (unsigned int d = 0; d < dim && layout.wide_domains; ++d)
       domain = std::min(domain, 4. * row[layout.extent + d] / grid.size(slice.cell, d));
   }
@@ -44,7 +53,12 @@ SliverFactors sliver_factors(const Body<dim> &body, const Slice &slice, const Gr
   const double fill = volume / grid.volume(slice.cell);
   if (fill > 0.99)
     return {1., 1., false};
-  return {std::min(1., 1.39 * std::sqrt(fill)), std::min(1., 1.95 * fill), true};
+  // The mass that a node moves is that of the material times its mean distance from the opposite face.
+  double part = fill;
+  for (unsigned int d = 0; d < dim; ++d)
+    part = std::min({part, 2. * first_moment[d] / volume, 2. * (1. - first_moment[d] / volume)});
+  part = std::max(part, least_part * fill);
+  return {std::min(1., 1.39 * std::sqrt(part)), std::min(1., 1.95 * part), true};
 }
 
 /// Stiffness and density at the fastest of a cell's points.

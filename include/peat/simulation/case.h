@@ -9,6 +9,7 @@
 #include <peat/simulation/output_parameters.h>
 #include <peat/simulation/recorder.h>
 #include <peat/simulation/reference.h>
+#include <peat/simulation/sweep_parameters.h>
 #include <peat/solver/implicit_parameters.h>
 #include <peat/solver/linear_solver.h>
 #include <peat/solver/scheme.h>
@@ -77,6 +78,7 @@ struct Case
   std::vector<ReferenceParameters<dim>> references;
   OutputParameters output;
   CompareParameters compare;
+  SweepParameters sweep;
 
   /// Name of the stage with which a body comes in, "" for those that are there from the start.
   std::string entry_stage(const BodyParameters<dim> &body) const;

@@ -18,6 +18,10 @@ int command_run(const RunOptions &options, MPI_Comm communicator);
 /// report.html.
 int command_compare(const RunOptions &options, MPI_Comm communicator);
 
+/// `peat sweep`: runs of the case with all combinations of some settings, each in a process of its own: error
+/// against run time. Leaves the directories of the runs, sweep.csv, summary.json and report.html.
+int command_sweep(const SweepOptions &options, MPI_Comm communicator);
+
 /// `peat check`: validate, and say what a run would take; runs nothing.
 int command_check(const RunOptions &options, MPI_Comm communicator);
 

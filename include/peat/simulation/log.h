@@ -19,8 +19,13 @@ public:
   /// Shown at most twice a second on a terminal, every ten seconds otherwise.
   void progress(double fraction, double time, unsigned long step, double point_steps_per_second);
 
+  /// The same with a text of one's own; on a terminal only.
+  void status(const std::string &text);
+
 private:
   void end_progress();
+  bool is_due();
+  void show(const std::string &text);
 
   std::ofstream file;
   const bool active;

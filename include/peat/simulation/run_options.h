@@ -12,4 +12,13 @@ struct RunOptions
   std::string output;                 ///< directory; "" for output/NAME-OF-FILE
   bool quiet = false;
 };
+
+/// The words that concern a sweep.
+struct SweepOptions
+{
+  RunOptions run;
+  std::vector<std::string> vary; ///< "Section/Key=value, value, ..."
+  double target = 0.;            ///< relative error; 0: that of the case
+  unsigned int n_jobs = 0;       ///< 0: that of the case
+};
 } // namespace peat

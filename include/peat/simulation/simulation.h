@@ -104,6 +104,8 @@ private:
 
 /// Asks SIGINT and SIGTERM to end the run at the next step; see Simulation::run().
 void catch_signals();
+/// Whether one of them has come.
+bool signal_was_caught();
 
 /// The directory that results go to if none is named.
 std::string default_output_directory(const std::string &file_name);
