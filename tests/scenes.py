@@ -140,9 +140,11 @@ def s5_patch(c):
         # The points move by 1e-10 of the body: about that much the weights change.
         run = c.run("S5_patch", {"Constants/shift": shift})
         c.below("rim prescribed, shift %g" % shift, largest(run, components), 1e-8)
-    for sx, sy in ((0, 0), (0.37, 0), (0, 0.6), (0.37, 0.37), (0.6, 0.6)):
-        run = c.run("S5_pressed_patch", {"Constants/sx": sx, "Constants/sy": sy}, may_fail=True)
-        name = "at rest under tractions, shift (%g, %g)" % (sx, sy)
+    for sx, sy, lattice in ((0, 0, "mesh"), (0.37, 0, "mesh"), (0, 0.6, "mesh"), (0.37, 0.37, "mesh"), (0.6, 0.6, "mesh"),
+                            (0.37, 0.6, "body")):
+        run = c.run("S5_pressed_patch", {"Constants/sx": sx, "Constants/sy": sy, "Bodies/patch/Point lattice": lattice},
+                    may_fail=True)
+        name = "at rest under tractions, shift (%g, %g), lattice of %s" % (sx, sy, lattice)
         if not run.completed:
             c.note(name, False, run.message)
             continue

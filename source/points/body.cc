@@ -1,10 +1,12 @@
 #include <peat/grid/cut_box.h>
 #include <peat/points/body.h>
+#include <peat/points/seeding.h>
 
 #include <deal.II/base/mpi.h>
-#include <deal.II/base/quadrature_lib.h>
 
+#include <map>
 #include <numeric>
+#include <optional>
 #include <sstream>
 
 namespace peat {
@@ -27,6 +29,14 @@ BodyParameters<dim>::BodyParameters(Section section, const std::vector<std::stri
               "difference (see the user guide).");
   section.add("Points per cell", points_per_direction, between(1, 16),
               "Material points per cell in each direction.");
+  std::string lattice = "mesh";
+  section.add("Point lattice", lattice, {"mesh", "body"},
+              "Which boxes the points stand for. 'mesh': equal parts of the cells, as far as the shape fills "
+              "them. 'body': "
+              "equal parts of the shape's bounds, about as large; without the thin pieces that limit the "
+              "step of a body "
+              "whose edges do not lie on the lines of the mesh.");
+  lattice_of_body = lattice == "body";
   section.add("Initial velocity", initial_velocity, dim, "m/s", "Velocity at the start.");
   section.add("Fall height", fall_height, nonnegative("m"),
               "Adds the velocity of a free fall from this height, along gravity at the time when the body "
@@ -50,6 +60,16 @@ Body<dim>::Body(const BodyParameters<dim> &parameters, const Material &material,
       particles(grid.triangulation(), grid.mapping(), columns.n_columns),
       count_in_cell(grid.n_local_cells(), 0)
 {
+  if (parameters.lattice_of_body && gauss_points == 0) {
+    if (!columns.wide_domains)
+      parameters.section.fail("Point lattice",
+                              "'body' is for 'Basis = gimp', whose points may reach over cells");
+    const Bounds<dim> bounds = initial_shape->bounds();
+    if (!grid.contains(bounds.lower) || !grid.contains(bounds.upper))
+      parameters.section.fail("Point lattice", "'body' needs a shape that has bounds, inside the mesh");
+    if (!is_uniform(grid, bounds))
+      parameters.section.fail("Point lattice", "'body' needs cells of one size where the body is");
+  }
   enter();
   if (initial_number == 0)
     parameters.section.fail("Shape", "body '" + parameters.name +
@@ -58,19 +78,6 @@ Body<dim>::Body(const BodyParameters<dim> &parameters, const Material &material,
 }
 
 namespace {
-/// Half the mean edge lengths of what a box keeps of itself when it is cut.
-template <int dim>
-dealii::Tensor<1, dim> half_extents(const CutBox<dim> &part, const dealii::Tensor<1, dim> &edges)
-{
-  dealii::Tensor<1, dim> half;
-  for (unsigned int d = 0; d < dim; ++d) {
-    const double cross_section = std::max(part.face_area[2 * d], part.face_area[2 * d + 1]);
-    const double length = cross_section > 0. ? part.volume / cross_section : std::pow(part.volume, 1. / dim);
-    half[d] = 0.5 * std::min(length, edges[d]);
-  }
-  return half;
-}
-
 /// See Layout::surface_depth.
 template <int dim>
 double surface_depth(const Shape<dim> &shape, const dealii::Point<dim> &x,
@@ -97,9 +104,10 @@ double surface_depth(const Shape<dim> &shape, const dealii::Point<dim> &x,
 
 template <int dim>
 void fill_row(std::vector<double> &row, const Layout &layout, const Material &material,
-              const BodyParameters<dim> &parameters, const CutBox<dim> &part,
-              const dealii::Tensor<1, dim> &half_extent)
+              const BodyParameters<dim> &parameters, const PointBox<dim> &box)
 {
+  const CutBox<dim> &part = box.part;
+  const dealii::Tensor<1, dim> half_extent = box.half_extents();
   double x[3] = {0., 0., 0.};
   for (unsigned int d = 0; d < dim; ++d)
     x[d] = part.centroid[d];
@@ -137,59 +145,6 @@ void fill_row(std::vector<double> &row, const Layout &layout, const Material &ma
 }
 } // namespace
 
-namespace {
-template <int dim>
-struct PartOfCell
-{
-  CutBox<dim> part;
-  dealii::Tensor<1, dim> edges; ///< of the box it was cut from
-};
-
-/// What the shape fills of n^dim equal boxes of a cell.
-template <int dim>
-std::vector<PartOfCell<dim>> even_parts(const Shape<dim> &shape, const Grid<dim> &grid, const CellId id,
-                                        const unsigned int n)
-{
-  std::vector<PartOfCell<dim>> parts;
-  for (unsigned int b = 0; b < (dim == 2 ? n * n : n * n * n); ++b) {
-    dealii::Point<dim> lower, upper;
-    dealii::Tensor<1, dim> edges;
-    for (unsigned int d = 0, rest = b; d < dim; ++d, rest /= n) {
-      const double h = grid.size(id, d);
-      lower[d] = grid.lower(id, d) + h * (rest % n) / n;
-      upper[d] = grid.lower(id, d) + h * (rest % n + 1) / n;
-      edges[d] = h / n;
-    }
-    const CutBox<dim> part = cut(shape, lower, upper);
-    if (part.volume > 0.)
-      parts.push_back({part, edges});
-  }
-  return parts;
-}
-
-/// Gauss points of a cell that the shape fills; elsewhere what it fills of as many boxes and some more.
-template <int dim>
-std::vector<PartOfCell<dim>> gauss_parts(const Shape<dim> &shape, const Grid<dim> &grid, const CellId id,
-                                         const unsigned int n)
-{
-  const auto whole = even_parts(shape, grid, id, 1);
-  if (whole.empty())
-    return {};
-  if (whole.front().part.volume < grid.volume(id) * (1. - 1e-10))
-    return even_parts(shape, grid, id, 2 * n);
-  std::vector<PartOfCell<dim>> parts;
-  const dealii::QGauss<dim> rule(n);
-  for (unsigned int q = 0; q < rule.size(); ++q) {
-    PartOfCell<dim> point;
-    point.part.volume = rule.weight(q) * grid.volume(id);
-    for (unsigned int d = 0; d < dim; ++d)
-      point.part.centroid[d] = grid.lower(id, d) + rule.point(q)[d] * grid.size(id, d);
-    parts.push_back(point);
-  }
-  return parts;
-}
-} // namespace
-
 template <int dim>
 void Body<dim>::seed()
 {
@@ -209,16 +164,20 @@ void Body<dim>::seed()
   // Without this the arrays would grow by doubling, which costs twice the memory while a large body is made.
   particles.get_property_pool().reserve(most_points);
 
+  std::optional<std::map<CellId, std::vector<PointBox<dim>>>> lattice;
+  if (parameters.lattice_of_body && gauss_points == 0)
+    lattice = lattice_boxes(*initial_shape, grid, n);
   std::vector<double> row;
   std::uint32_t n_local = 0;
   std::string problem;
   const auto make_points = [&](const auto &cell) {
     const CellId id = cell->active_cell_index();
-    for (const auto &[part, edges] : gauss_points > 0 ? gauss_parts(*initial_shape, grid, id, n)
-                                                      : even_parts(*initial_shape, grid, id, n)) {
-      fill_row(row, columns, body_material, parameters, part, half_extents(part, edges));
-      const auto unit = grid.mapping().transform_real_to_unit_cell(cell, part.centroid);
-      particles.insert_particle(part.centroid, unit, n_local++, cell, row);
+    for (const PointBox<dim> &box : lattice            ? (*lattice)[id]
+                                    : gauss_points > 0 ? gauss_boxes(*initial_shape, grid, id, n)
+                                                       : even_boxes(*initial_shape, grid, id, n)) {
+      fill_row(row, columns, body_material, parameters, box);
+      const auto unit = grid.mapping().transform_real_to_unit_cell(cell, box.part.centroid);
+      particles.insert_particle(box.part.centroid, unit, n_local++, cell, row);
     }
   };
   for (const auto &cell : grid.triangulation().active_cell_iterators()) {

@@ -25,6 +25,7 @@ struct BodyParameters
   std::string material;
   std::shared_ptr<const Shape<dim>> shape;
   unsigned int points_per_direction = 2;
+  bool lattice_of_body = false; ///< see `Point lattice`
   Function initial_velocity;
   double fall_height = 0.; ///< [m]
   /// Velocity that a fall from there gives, to be set by who knows gravity; added to the initial velocity.
