@@ -265,6 +265,9 @@ def compare_tables(a, b):
     for name in names:
         values = [abs(float(row[name])) for row in rows_a if row[name] not in ABSENT]
         scale[unit(name)] = max([scale.get(unit(name), 0.)] + values)
+    # The momentum of bodies that move against each other is a difference.
+    if "mass [kg]" in names:
+        scale["[N s]"] = max(scale["[N s]"], scale["[kg]"] * scale["[m/s]"])
     for name in names:
         for p, q in zip(rows_a, rows_b):
             if (p[name] in ABSENT) != (q[name] in ABSENT):

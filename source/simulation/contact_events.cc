@@ -1,5 +1,6 @@
 #include <peat/simulation/contact_events.h>
 
+#include <numeric>
 #include <sstream>
 
 namespace peat {
@@ -23,8 +24,13 @@ void ContactEvents<dim>::note(const double time, const double dt, const Scene<di
         log.line(text.str());
       }
     }
-    if (state.normal_force > record.largest_force) {
-      record.largest_force = state.normal_force;
+    const unsigned int turn = record.n_steps++ % n_averaged;
+    record.impulses[turn] = dt * state.normal_force;
+    record.lengths[turn] = dt;
+    const double force = std::accumulate(record.impulses.begin(), record.impulses.end(), 0.) /
+                         std::accumulate(record.lengths.begin(), record.lengths.end(), 0.);
+    if (record.n_steps >= n_averaged && force > record.largest_force) {
+      record.largest_force = force;
       record.time_of_largest = time;
     }
     record.impulse += dt * state.normal_force;
@@ -38,12 +44,12 @@ void ContactEvents<dim>::summarise(const Scene<dim> &scene)
   for (const auto &[name, record] : records) {
     std::ostringstream text;
     text << "contact '" << name << "': ";
-    if (record.largest_force == 0.)
+    if (record.n_events == 0)
       text << "bodies do not touch";
     else
-      text << "largest normal force " << record.largest_force << " N at t = " << record.time_of_largest
-           << " s, normal impulse " << record.impulse << " N s, deepest overlap "
-           << std::max(0., -record.smallest_gap) << " m, in the end "
+      text << "largest normal force " << record.largest_force << " N (mean of " << n_averaged
+           << " steps) at t = " << record.time_of_largest << " s, normal impulse " << record.impulse
+           << " N s, deepest overlap " << std::max(0., -record.smallest_gap) << " m, in the end "
            << (record.touches ? "in contact" : "apart");
     log.line(text.str());
   }

@@ -3,6 +3,7 @@
 #include <peat/simulation/log.h>
 #include <peat/solver/scene.h>
 
+#include <array>
 #include <map>
 #include <string>
 
@@ -20,12 +21,18 @@ public:
   void summarise(const Scene<dim> &scene);
 
 private:
+  /// The force of one step rings with the lumps of mass that meet in it.
+  static constexpr unsigned int n_averaged = 10;
+
   struct Record
   {
     bool touches = false;
     unsigned int n_told = 0;
     unsigned long n_events = 0;
-    double largest_force = 0.; ///< normal [N]
+    unsigned long n_steps = 0;
+    /// Impulses and lengths of the last steps, in turn.
+    std::array<double, n_averaged> impulses{}, lengths{};
+    double largest_force = 0.; ///< normal, mean over as many steps [N]
     double time_of_largest = 0.;
     double impulse = 0.; ///< normal [N s]
     double smallest_gap = std::numeric_limits<double>::infinity();
