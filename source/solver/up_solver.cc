@@ -87,19 +87,19 @@ void UpSolver<dim>::prepare()
       tracers.settle(scene.body(name), active);
     tracers.locate(active);
   }
-  std::vector<typename Space<dim>::Index> unused;
-  find_unused(unused);
+  unused = find_unused();
   boundary.locate(active, unused);
   resize();
   project_start();
 }
 
 template <int dim>
-void UpSolver<dim>::find_unused(std::vector<typename Space<dim>::Index> &unused) const
+std::vector<typename Space<dim>::Index> UpSolver<dim>::find_unused() const
 {
+  std::vector<typename Space<dim>::Index> found;
   // Domains of material points that end on a face of cells reach nodes beyond it in name only.
   if (unknowns.nodes() != Nodes::gimp)
-    return;
+    return found;
   dealii::TrilinosWrappers::MPI::Vector mass(unknowns.owned()[0], grid.communicator());
   for (const auto &body : scene.bodies)
     form->sum_mass(*body, mass);
@@ -109,7 +109,8 @@ void UpSolver<dim>::find_unused(std::vector<typename Space<dim>::Index> &unused)
   all = mass;
   for (const auto index : unknowns.relevant()[0])
     if (all(index) <= 1e-14 * largest)
-      unused.push_back(index);
+      found.push_back(index);
+  return found;
 }
 
 template <int dim>
@@ -147,10 +148,10 @@ void UpSolver<dim>::resize()
     state.moved.reinit(unknowns.owned()[0], unknowns.relevant()[0], communicator);
   }
 
-  for (BlockVector *vector : {&unknown, &correction, &residual, &right_side, &rate, &second, &total})
+  for (BlockVector *vector : {&unknown, &correction, &residual, &right_side, &rate, &second, &total, &change})
     vector->reinit(unknowns.owned(), communicator);
-  for (BlockVector *vector :
-       {&state.unknown, &state.rate_history, &state.second_history, &ghosted_total, &ghosted_rate})
+  for (BlockVector *vector : {&state.unknown, &state.rate_history, &state.second_history, &ghosted_total,
+                              &ghosted_rate, &ghosted_motion})
     vector->reinit(unknowns.owned(), unknowns.relevant(), communicator);
 }
 
@@ -470,36 +471,24 @@ void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
 {
   share_unknown();
   ghosted_rate = rate;
-  dealii::Tensor<1, dim> weight;
-  double gravity_work = 0.;
-  add_weight(level, weight, gravity_work);
-  StepWork work;
+  bool all_finite = true;
   for (const auto &body : scene.bodies)
-    form->update_points(*body, level, state, ghosted_rate, volume_loads(level.time).gravity, moves, work);
-  StepWork of_followers;
+    form->update_points(*body, level, state, ghosted_rate, moves, all_finite);
   for (Scene<dim> *other : followers)
     for (const auto &body : other->bodies)
-      form->update_points(*body, level, state, ghosted_rate, volume_loads(level.time).gravity, false,
-                          of_followers);
+      form->update_points(*body, level, state, ghosted_rate, false, all_finite);
   const double dt = level.dt;
-  const auto held = boundary.reactions(level, residual, unknown);
-  const auto &loads = boundary.loads();
-  book.impulse += dt * (held.force + loads.force + weight);
-  book.gross_impulse += dt * (held.gross_force + loads.gross_force + weight.norm());
-  book.external_work += held.work + loads.work + gravity_work;
-  book.gravity_work += gravity_work;
-  book.fluid_outflow += dt * (held.outflow + loads.outflow);
-  book.fluid_squeezed += work.fluid_squeezed;
-  book.seepage_dissipation += work.seepage_dissipation;
-  book.seepage_work += work.seepage_work;
   total += unknown;
+  change += unknown;
   if (moved.size() > 0) {
     moved += unknown.block(0);
     state.moved = moved;
   }
-  if (unknowns.has_pressure())
+  if (unknowns.has_pressure()) {
+    change.block(1) -= second.block(1);
     second.block(1) = unknown.block(1);
-  int finite = work.finite;
+  }
+  int finite = all_finite;
   finite = dealii::Utilities::MPI::min(finite, grid.communicator());
   now += dt;
   nodal.time = now;
@@ -516,13 +505,30 @@ void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
 }
 
 template <int dim>
-void UpSolver<dim>::add_weight(const TimeLevel &level, dealii::Tensor<1, dim> &weight, double &work) const
+void UpSolver<dim>::book_work(const TimeLevel &level, const double share,
+                              const dealii::TrilinosWrappers::MPI::Vector &motion)
 {
-  const VolumeLoads<dim> loads = volume_loads(level.time);
-  if (loads.gravity.norm() == 0. && loads.forces.empty())
-    return;
-  for (const auto &body : scene.bodies)
-    form->sum_weight(*body, state, loads, level.time, weight, work);
+  ghosted_motion.block(0) = motion;
+  const VolumeLoads<dim> volume = volume_loads(level.time);
+  dealii::Tensor<1, dim> weight;
+  double gravity_work = 0.;
+  StepWork work;
+  for (const auto &body : scene.bodies) {
+    if (volume.gravity.norm() > 0. || !volume.forces.empty())
+      form->sum_weight(*body, ghosted_motion.block(0), volume, level.time, weight, gravity_work);
+    form->book_seepage(*body, level, state, volume.gravity, work);
+  }
+  const auto held = boundary.reactions(level, residual, motion);
+  const auto loads = boundary.loads(level, ghosted_motion.block(0));
+  const double dt = share * level.dt;
+  book.impulse += dt * (held.force + loads.force + weight);
+  book.gross_impulse += dt * (held.gross_force + loads.gross_force + weight.norm());
+  book.external_work += share * (held.work + loads.work + gravity_work);
+  book.gravity_work += share * gravity_work;
+  book.fluid_outflow += dt * (held.outflow + loads.outflow);
+  book.fluid_squeezed += share * work.fluid_squeezed;
+  book.seepage_dissipation += share * work.seepage_dissipation;
+  book.seepage_work += share * work.seepage_work;
 }
 
 template <int dim>
@@ -583,6 +589,9 @@ void UpSolver<dim>::relocate_points()
     }
   }
   changed = dealii::Utilities::MPI::max(changed | leaves, grid.communicator());
+  // Domains may reach nodes now that they did not reach before.
+  if (!changed)
+    changed = dealii::Utilities::MPI::max(int(find_unused() != unused), grid.communicator());
   if (changed)
     prepare();
   else
