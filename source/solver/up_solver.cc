@@ -56,7 +56,7 @@ UpSolver<dim>::UpSolver(const ImplicitParameters &parameters, const LinearSolver
       nearly_incompressible(is_nearly_incompressible(scene)), unknowns(grid, displacement),
       active(grid, displacement == Nodes::gimp ? 4 : 2),
       // What is to rest under the explicit step must be in equilibrium without the projection.
-      form(UpForm<dim>::make(unknowns, method != Method::points_at_rest)),
+      form(UpForm<dim>::make(unknowns, method != Method::points_at_rest)), small_nodes(unknowns),
       boundary(unknowns, scene, parameters.surface_penalty),
       linear_solver(linear_parameters, "an implicit step"), now(start_time), book(carried)
 {}
@@ -87,30 +87,27 @@ void UpSolver<dim>::prepare()
       tracers.settle(scene.body(name), active);
     tracers.locate(active);
   }
-  unused = find_unused();
-  boundary.locate(active, unused);
+  survey_nodes();
+  boundary.locate(active, small_nodes.unused());
   resize();
   project_start();
 }
 
 template <int dim>
-std::vector<typename Space<dim>::Index> UpSolver<dim>::find_unused() const
+void UpSolver<dim>::survey_nodes()
 {
-  std::vector<typename Space<dim>::Index> found;
-  // Domains of material points that end on a face of cells reach nodes beyond it in name only.
-  if (unknowns.nodes() != Nodes::gimp)
-    return found;
+  if (method == Method::finite_elements)
+    return;
   dealii::TrilinosWrappers::MPI::Vector mass(unknowns.owned()[0], grid.communicator());
   for (const auto &body : scene.bodies)
     form->sum_mass(*body, mass);
   mass.compress(dealii::VectorOperation::add);
-  const double largest = mass.linfty_norm();
   dealii::TrilinosWrappers::MPI::Vector all(unknowns.owned()[0], unknowns.relevant()[0], grid.communicator());
   all = mass;
-  for (const auto index : unknowns.relevant()[0])
-    if (all(index) <= 1e-14 * largest)
-      found.push_back(index);
-  return found;
+  double speed = 0.;
+  for (const auto &body : scene.bodies)
+    speed = std::max(speed, std::sqrt(body->material().initial_modulus() / body->material().density()));
+  small_nodes.survey(all, speed);
 }
 
 template <int dim>
@@ -129,6 +126,13 @@ void UpSolver<dim>::resize()
       }
       boundary.constraints().add_entries_local_to_global(list, pattern, true);
     }
+  if (method != Method::finite_elements)
+    small_nodes.for_each_line([&](const auto &nodes) {
+      for (unsigned int d = 0; d < dim; ++d) {
+        list = {nodes[0] + d, nodes[1] + d, nodes[2] + d};
+        boundary.constraints().add_entries_local_to_global(list, pattern, true);
+      }
+    });
   dealii::IndexSet owned(unknowns.n_unknowns()), relevant(unknowns.n_unknowns());
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
     owned.add_indices(unknowns.owned()[b], b * unknowns.first_pressure());
@@ -318,6 +322,7 @@ void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
   for (const auto &body : scene.bodies)
     form->assemble(*body, level, state, loads, stabilisation, system);
   boundary.assemble(level, state, residual, with_matrix ? &matrix : nullptr);
+  small_nodes.assemble(level, state, boundary.constraints(), residual, with_matrix ? &matrix : nullptr);
   residual.compress(dealii::VectorOperation::add);
   right_side = residual;
   boundary.constraints().set_zero(right_side);
@@ -557,6 +562,14 @@ void UpSolver<dim>::move_tracers()
 }
 
 template <int dim>
+bool UpSolver<dim>::reach_changes()
+{
+  const auto before = small_nodes.unused();
+  survey_nodes();
+  return dealii::Utilities::MPI::max(int(small_nodes.unused() != before), grid.communicator());
+}
+
+template <int dim>
 void UpSolver<dim>::relocate_points()
 {
   int changed = 0, leaves = 0;
@@ -591,7 +604,7 @@ void UpSolver<dim>::relocate_points()
   changed = dealii::Utilities::MPI::max(changed | leaves, grid.communicator());
   // Domains may reach nodes now that they did not reach before.
   if (!changed)
-    changed = dealii::Utilities::MPI::max(int(find_unused() != unused), grid.communicator());
+    changed = reach_changes();
   if (changed)
     prepare();
   else

@@ -218,9 +218,9 @@ double UpSolver<dim>::runge_kutta_step(const double latest)
     if (ends_there)
       dt = latest - now;
     const Ledger<dim> book_before = book;
-    const double error = find_stages(dt);
+    const double error = try_stages(dt);
     // What loads do that jump is no error that shorter steps could reduce.
-    const bool free = parameters.fixed_step > 0. || !first_step_done;
+    const bool free = parameters.fixed_step > 0. || (!first_step_done && std::isfinite(error));
     if (free || error <= parameters.step_tolerance) {
       const double growth = std::min(parameters.largest_growth,
                                      0.8 * std::sqrt(parameters.step_tolerance / std::max(error, 1e-300)));
@@ -243,6 +243,24 @@ double UpSolver<dim>::runge_kutta_step(const double latest)
 }
 
 template <int dim>
+dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const
+{
+  dealii::TrilinosWrappers::MPI::Vector velocity(unknowns.owned()[0], grid.communicator()), mass(velocity);
+  for (const auto &body : scene.bodies) {
+    form->add_momentum(*body, velocity);
+    form->sum_mass(*body, mass);
+  }
+  velocity.compress(dealii::VectorOperation::add);
+  mass.compress(dealii::VectorOperation::add);
+  for (const auto index : unknowns.owned()[0])
+    if (mass(index) > 0.)
+      velocity(index) /= mass(index);
+  velocity.compress(dealii::VectorOperation::insert);
+  boundary.constraints().set_zero(velocity);
+  return velocity;
+}
+
+template <int dim>
 TimeLevel UpSolver<dim>::stage_level(const double dt, const bool last) const
 {
   const double g = stage_share;
@@ -256,6 +274,20 @@ TimeLevel UpSolver<dim>::stage_level(const double dt, const bool last) const
 }
 
 template <int dim>
+double UpSolver<dim>::try_stages(const double dt)
+{
+  // Where Newton's iterations fail a shorter step may do.
+  if (parameters.fixed_step > 0.)
+    return find_stages(dt);
+  try {
+    return find_stages(dt);
+  } catch (const NumericalError &) {
+    matrix_is_valid = false;
+    return std::numeric_limits<double>::infinity();
+  }
+}
+
+template <int dim>
 double UpSolver<dim>::find_stages(const double dt)
 {
   const double g = stage_share;
@@ -264,6 +296,8 @@ double UpSolver<dim>::find_stages(const double dt)
   old.block(0) = 0.;
   state.second_history = old;
   unknown = old;
+  if (mode == Mode::dynamic && !linear)
+    unknown.block(0).equ(g * dt, mean_velocity());
   TimeLevel level = stage_level(dt, false);
   solve(level, now, now + g * dt, parameters.newton_tolerance);
 
@@ -376,8 +410,10 @@ void UpSolver<dim>::reset_displacements()
   template void UpSolver<dim>::damped_step(double);                                                          \
   template void UpSolver<dim>::generalised_alpha_step(double);                                               \
   template double UpSolver<dim>::runge_kutta_step(double);                                                   \
+  template double UpSolver<dim>::try_stages(double);                                                         \
   template double UpSolver<dim>::find_stages(double);                                                        \
   template double UpSolver<dim>::estimated_error(const BlockVector &);                                       \
+  template dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const;                       \
   template TimeLevel UpSolver<dim>::stage_level(double, bool) const;
 PEAT_INSTANTIATE(2)
 PEAT_INSTANTIATE(3)

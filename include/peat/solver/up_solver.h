@@ -3,6 +3,7 @@
 #include <peat/solver/implicit_parameters.h>
 #include <peat/solver/linear_solver.h>
 #include <peat/solver/scene.h>
+#include <peat/solver/small_nodes.h>
 #include <peat/solver/solver.h>
 #include <peat/solver/time_step.h>
 #include <peat/solver/up_boundary.h>
@@ -83,8 +84,10 @@ public:
 
 private:
   void resize();
-  /// Displacements of nodes without mass. Collective.
-  std::vector<typename Space<dim>::Index> find_unused() const;
+  /// Find nodes with little or no mass. Collective.
+  void survey_nodes();
+  /// Whether points reach other nodes than before, which have no equations yet. Collective.
+  bool reach_changes();
   void project_start();
   VolumeLoads<dim> volume_loads(double time) const;
 
@@ -96,6 +99,10 @@ private:
   double runge_kutta_step(double latest);
   /// Both stages of a step; returns the estimated error over the largest changes so far.
   double find_stages(double dt);
+  /// The same; infinite if the equations were not solved, unless the user has fixed the step.
+  double try_stages(double dt);
+  /// Of the points around a node, weighted by mass and shape function; 0 where conditions prescribe.
+  dealii::TrilinosWrappers::MPI::Vector mean_velocity() const;
   double estimated_error(const BlockVector &difference);
   TimeLevel stage_level(double dt, bool last) const;
 
@@ -130,11 +137,11 @@ private:
   Scene<dim> &scene;
   const bool linear, finite_strain, nearly_incompressible;
   std::vector<Scene<dim> *> followers;
-  std::vector<typename Space<dim>::Index> unused;
 
   Space<dim> unknowns;
   ActiveNodes<dim> active;
   std::unique_ptr<UpForm<dim>> form;
+  SmallNodes<dim> small_nodes;
   UpBoundary<dim> boundary;
   LinearSolver linear_solver;
   BlockMatrix matrix;
