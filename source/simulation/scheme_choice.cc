@@ -15,7 +15,7 @@ namespace peat {
 namespace {
 // Measured (benchmarks.md): what a step costs in explicit ones.
 constexpr double semi_implicit_cost = 3.;
-constexpr double implicit_cost_2d = 60., implicit_cost_3d = 250.;
+constexpr double implicit_cost_2d = 250., implicit_cost_3d = 1000.;
 // Steps for the period of a wave, for the rise of a load, and for what then fades away.
 constexpr double steps_per_period = 100., steps_per_change = 25., steps_of_decay = 30.;
 

@@ -246,7 +246,8 @@ void UpSolver<dim>::prepare_split()
 }
 
 template <int dim>
-void UpSolver<dim>::prepare_linear_solver(const TimeLevel &level, const bool coupled)
+void UpSolver<dim>::prepare_linear_solver(const TimeLevel &level, const bool coupled,
+                                          const bool changed_little)
 {
   PreconditionerData data;
   if (coupled && unknowns.has_pressure()) {
@@ -269,7 +270,8 @@ void UpSolver<dim>::prepare_linear_solver(const TimeLevel &level, const bool cou
     inertia *= bound * level.acceleration;
     data.inertia = &inertia;
   }
-  linear_solver.prepare(matrix, data);
+  linear_solver.prepare(matrix, data,
+                        changed_little ? LinearSolver::Reuse::preconditioner : LinearSolver::Reuse::pattern);
 }
 
 template <int dim>
@@ -329,9 +331,11 @@ void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
   if (!with_matrix)
     return;
   fill_empty_diagonal(level);
+  // Points move little in a step: a factorisation serves the matrices of many.
+  const bool changed_little = matrix_is_near && same(level, matrix_level);
   matrix_level = level;
-  matrix_is_valid = true;
-  prepare_linear_solver(level, level.velocity > 0.);
+  matrix_is_valid = matrix_is_near = true;
+  prepare_linear_solver(level, level.velocity > 0., changed_little);
 }
 
 template <int dim>
@@ -464,8 +468,8 @@ void UpSolver<dim>::project_start()
   residual.compress(dealii::VectorOperation::add);
   residual.block(0) = 0.;
   fill_empty_diagonal(level);
-  prepare_linear_solver(level, false);
-  matrix_is_valid = false;
+  prepare_linear_solver(level, false, false);
+  matrix_is_valid = matrix_is_near = false;
   correction = 0.;
   linear_solver.solve(correction, residual);
   second.block(1) = correction.block(1);

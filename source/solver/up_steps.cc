@@ -82,7 +82,7 @@ void UpSolver<dim>::start(const Mode stage_mode)
   second.block(0) = correction.block(0);
   if (unknowns.has_pressure())
     rate.block(1) = correction.block(1);
-  matrix_is_valid = false;
+  matrix_is_valid = matrix_is_near = false;
 }
 
 template <int dim>
@@ -228,6 +228,10 @@ double UpSolver<dim>::runge_kutta_step(const double latest)
       next_step = parameters.fixed_step > 0. ? parameters.fixed_step
                   : !first_step_done         ? dt
                                              : std::max(dt * growth, ends_there && growth > 1. ? before : 0.);
+      // A step that hardly grows stays, and with it its factorisation.
+      constexpr double hardly = 1.3;
+      if (next_step > dt && next_step < hardly * dt && !ends_there)
+        next_step = dt;
       first_step_done = true;
       accept(stage_level(dt, true), method == Method::material_points);
       return dt;

@@ -241,7 +241,7 @@ void integrate(const Problem<dim> &problem, const TimeLevel &level, dealii::Vect
         const Vector dN = u.shape_grad(order_u[i], q);
         for (unsigned int d = 0; d < dim; ++d) {
           const auto row = dof_u[i * dim + d];
-          residual(row) += w * (rho * (problem.loads.gravity[d] - acceleration[d]) * N - stress[d] * dN);
+          residual(row) += w * (rho * (problem.loads.gravity[d] - acceleration[d]) * N - (stress * dN)[d]);
           for (unsigned int j = 0; j < n_nodes; ++j) {
             const Vector dM = u.shape_grad(order_u[j], q);
             for (unsigned int e = 0; e < dim; ++e) {

@@ -119,7 +119,7 @@ private:
   void describe_unknowns();
   /// Room for the volumetric split, where the linear solver has a use for it.
   void prepare_split();
-  void prepare_linear_solver(const TimeLevel &level, bool coupled);
+  void prepare_linear_solver(const TimeLevel &level, bool coupled, bool changed_little);
   void share_unknown();
   /// After the unknowns have been found: points and tracers.
   void accept(const TimeLevel &level, bool moves);
@@ -149,6 +149,7 @@ private:
   std::unique_ptr<VolumetricSplit> split;
   dealii::TrilinosWrappers::MPI::Vector inertia, mass_diagonal;
   bool matrix_is_valid = false;
+  bool matrix_is_near = false; ///< to the one of `matrix_level` that the linear solver saw last
   TimeLevel matrix_level;
 
   BlockVector unknown, correction, residual, right_side; ///< this rank's
