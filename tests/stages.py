@@ -9,22 +9,41 @@ import sys
 import scene_tools
 
 
-def fields(points):
-    return {name: points[name] for name in ("pressure", "effective stress", "displacement")}
+FIELDS = ("pressure", "effective stress", "displacement")
+SPEED = 1664.5   # c_u of G1_static.prm [m/s]
 
 
-def difference(a, b, name):
-    """Largest difference of a field between two sets of points in the same order, over its largest value."""
-    scale = max(abs(v) for row in a[name] for v in row)
-    return max(abs(p - q) for r, s in zip(a[name], b[name]) for p, q in zip(r, s)) / (scale or 1.)
+def by_number(points, name):
+    return {round(number): value for (number,), value in zip(points["id"], points[name])}
 
 
-def chain(c, scene, schemes, **settings):
-    """A static stage, then the schemes one after the other for a moment each; points at each end."""
-    raise NotImplementedError
+def change(before, after, name, scale):
+    """Largest change of a field of points."""
+    a, b = by_number(before, name), by_number(after, name)
+    return max(abs(p - q) for number in a for p, q in zip(a[number], b[number])) / scale
 
 
-CASES = {}
+def rest(c):
+    for basis in "gimp", "q1":
+        for first, then in (("explicit", {}), ("semi-implicit", {}),
+                            ("explicit", {"Stages/years/Solver": "dynamic", "Stages/years/Scheme": "implicit",
+                                          "Stages/years/Duration": "End"}),
+                            ("implicit", {"Stages/years/Solver": "dynamic", "Stages/years/Scheme": "explicit",
+                                          "Stages/years/Duration": "End/10"})):
+            run = c.run("G1_stages", dict(then, **{"Explicit MPM/Basis": basis, "Stages/rest/Scheme": first,
+                                                 "Constants/End": "100*0.55*h/c_u"}))
+            pictures = [run.points("ground", k) for k in range(3)]
+            last = then.get("Stages/years/Scheme", "quasi-static")
+            # Displacements over the height, the others over their largest values.
+            scales = {name: max(abs(v) for row in pictures[0][name] for v in row) for name in FIELDS}
+            scales["displacement"] = 10.
+            for k, stage in ((1, first), (2, last)):
+                largest = max(change(pictures[k - 1], pictures[k], name, scales[name]) for name in FIELDS)
+                c.below("%s, static to %s to %s: change in '%s'" % (basis, first, last, stage), largest, 1e-8)
+            c.below("largest speed over c_u", max(run.table("statistics.csv")["largest speed"]) / SPEED, 1e-10)
+
+
+CASES = {"stages_rest": (rest, ("quick", "full"), 10)}
 
 if __name__ == "__main__":
     sys.exit(scene_tools.main(CASES, __doc__))

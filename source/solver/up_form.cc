@@ -27,6 +27,8 @@ public:
   void add_momentum(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &momentum) override;
   void sum_mass(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &mass) override;
   void sum_inertia(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &inertia) override;
+  void add_squares(const Body<dim> &body, const BlockVector &field, std::array<double, 2> &squares,
+                   std::array<double, 2> &volumes) override;
   void sum_weight(const Body<dim> &body, const dealii::TrilinosWrappers::MPI::Vector &motion,
                   const VolumeLoads<dim> &loads, double time, dealii::Tensor<1, dim> &weight,
                   double &work) override;
@@ -448,6 +450,33 @@ void PointForm<dim, reach>::sum_inertia(const Body<dim> &body, dealii::TrilinosW
 {
   sum_over_nodes(body, inertia,
                  [](const Points &points, const unsigned int i, unsigned int) { return points.N[i]; });
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::add_squares(const Body<dim> &body, const BlockVector &field,
+                                        std::array<double, 2> &squares, std::array<double, 2> &volumes)
+{
+  const bool has_pressure = body.material().mixture() && space.has_pressure();
+  double U[n_u], P[n_p];
+  for (const Slice &slice : body.slices()) {
+    for (unsigned int i = 0; i < n_u; ++i)
+      U[i] = field.block(0)(space.displacements(slice.cell)[i]);
+    for (unsigned int i = 0; i < n_p && has_pressure; ++i)
+      P[i] = field.block(1)(space.pressures(slice.cell)[i] - space.first_pressure());
+    for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
+      const Points points(space.grid(), body, slice, begin);
+      for (unsigned int d = 0; d < dim; ++d) {
+        const Lanes u = points.value(U, d);
+        squares[0] += sum(points.volume * u * u);
+      }
+      volumes[0] += sum(points.volume);
+      if (!has_pressure)
+        continue;
+      const Lanes p = points.pressure(P);
+      squares[1] += sum(points.volume * p * p);
+      volumes[1] += sum(points.volume);
+    }
+  }
 }
 
 template <int dim, unsigned int reach>

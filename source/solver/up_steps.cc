@@ -339,6 +339,21 @@ double UpSolver<dim>::find_stages(const double dt)
 }
 
 template <int dim>
+std::array<double, 2> UpSolver<dim>::mean_at_points(const BlockVector &field)
+{
+  ghosted_motion = field;
+  std::array<double, 2> squares{}, volumes{};
+  for (const auto &body : scene.bodies)
+    form->add_squares(*body, ghosted_motion, squares, volumes);
+  for (unsigned int b = 0; b < 2; ++b) {
+    squares[b] = dealii::Utilities::MPI::sum(squares[b], grid.communicator());
+    volumes[b] = dealii::Utilities::MPI::sum(volumes[b], grid.communicator());
+    squares[b] = volumes[b] > 0. ? std::sqrt(squares[b] / volumes[b]) : 0.;
+  }
+  return squares;
+}
+
+template <int dim>
 double UpSolver<dim>::estimated_error(const BlockVector &difference)
 {
   BlockVector changed = change;
@@ -346,13 +361,13 @@ double UpSolver<dim>::estimated_error(const BlockVector &difference)
   if (unknowns.has_pressure())
     changed.block(1) -= second.block(1);
   // Changes that are nothing beside a cell or the pressures need no accuracy.
-  const std::array<double, 2> least = {1e-6 * grid.smallest_cell_size(),
-                                       unknowns.has_pressure() ? 1e-4 * unknown.block(1).linfty_norm() : 0.};
+  const std::array<double, 2> least = {1e-6 * grid.smallest_cell_size(), 1e-3 * mean_at_points(unknown)[1]};
+  // At points: what nodes have that points do not see is no error.
+  const auto changes = mean_at_points(changed), errors = mean_at_points(difference);
   double error = 0.;
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
-    change_scale[b] = std::max({change_scale[b], changed.block(b).linfty_norm(), least[b]});
-    const double rms = difference.block(b).l2_norm() / std::sqrt(double(difference.block(b).size()));
-    error = std::max(error, change_scale[b] > 0. ? rms / change_scale[b] : 0.);
+    change_scale[b] = std::max({change_scale[b], 2. * changes[b], least[b]});
+    error = std::max(error, change_scale[b] > 0. ? errors[b] / change_scale[b] : 0.);
   }
   // Points must not pass a cell.
   if (method == Method::material_points) {
@@ -416,6 +431,7 @@ void UpSolver<dim>::reset_displacements()
   template double UpSolver<dim>::runge_kutta_step(double);                                                   \
   template double UpSolver<dim>::try_stages(double);                                                         \
   template double UpSolver<dim>::find_stages(double);                                                        \
+  template std::array<double, 2> UpSolver<dim>::mean_at_points(const BlockVector &);                         \
   template double UpSolver<dim>::estimated_error(const BlockVector &);                                       \
   template dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const;                       \
   template TimeLevel UpSolver<dim>::stage_level(double, bool) const;

@@ -134,6 +134,10 @@ public:
   virtual void sum_mass(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &mass) = 0;
   /// Add sum m N_i^2, the diagonal of the mass matrix.
   virtual void sum_inertia(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &inertia) = 0;
+  /// Add volume integrals over the points: of the squares of a displacement and of a pressure field (with
+  /// ghosts), and of 1 for each of them.
+  virtual void add_squares(const Body<dim> &body, const BlockVector &field, std::array<double, 2> &squares,
+                           std::array<double, 2> &volumes) = 0;
   /// Sum of the points' weights and other body forces, and their work on a motion (with ghosts) [m].
   virtual void sum_weight(const Body<dim> &body, const dealii::TrilinosWrappers::MPI::Vector &motion,
                           const VolumeLoads<dim> &loads, double time, dealii::Tensor<1, dim> &weight,

@@ -104,6 +104,8 @@ private:
   /// Of the points around a node, weighted by mass and shape function; 0 where conditions prescribe.
   dealii::TrilinosWrappers::MPI::Vector mean_velocity() const;
   double estimated_error(const BlockVector &difference);
+  /// Roots of the mean squares of displacement [m] and pressure [Pa] at the points.
+  std::array<double, 2> mean_at_points(const BlockVector &field);
   TimeLevel stage_level(double dt, bool last) const;
 
   /// Find the unknowns at the end of [start, end] that satisfy the equations at a level.
