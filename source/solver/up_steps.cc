@@ -210,6 +210,7 @@ double UpSolver<dim>::runge_kutta_step(const double latest)
 {
   constexpr unsigned int most_attempts = 30;
   double dt = std::min(suggested_step().dt, latest - now);
+  double error_before = std::numeric_limits<double>::infinity();
   for (unsigned int attempt = 0; attempt < most_attempts; ++attempt) {
     // A rest that is shorter than a tenth of a step is shared with this one.
     if (dt < latest - now && latest - now < 1.1 * dt)
@@ -219,14 +220,18 @@ double UpSolver<dim>::runge_kutta_step(const double latest)
       dt = latest - now;
     const Ledger<dim> book_before = book;
     const double error = try_stages(dt);
-    // What loads do that jump is no error that shorter steps could reduce.
-    const bool free = parameters.fixed_step > 0. || (!first_step_done && std::isfinite(error));
+    // What jumps is no error that shorter steps could reduce: loads at the start of a stage, and what points
+    // do that come to other nodes or surfaces that cut other cells.
+    constexpr double reduced = 0.7;
+    const bool jumps = std::isfinite(error) && (!first_step_done || error > reduced * error_before);
+    error_before = error;
+    const bool free = parameters.fixed_step > 0. || jumps;
     if (free || error <= parameters.step_tolerance) {
       const double growth = std::min(parameters.largest_growth,
                                      0.8 * std::sqrt(parameters.step_tolerance / std::max(error, 1e-300)));
       const double before = std::max(dt, ends_there ? next_step : 0.);
       next_step = parameters.fixed_step > 0. ? parameters.fixed_step
-                  : !first_step_done         ? dt
+                  : jumps                    ? dt
                                              : std::max(dt * growth, ends_there && growth > 1. ? before : 0.);
       // A step that hardly grows stays, and with it its factorisation.
       constexpr double hardly = 1.3;
