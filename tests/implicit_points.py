@@ -69,7 +69,7 @@ def d5(c, sizes=(20, 40, 80)):
         exact, errors = d5_eigenvalues(form), []
         for n in sizes:
             run = c.run("D5_standing_wave", dict(IMPLICIT, **{
-                "Constants/cells": n, STEP: 2e-3 / n, "Seepage inertia": inertia, "Output/Statistics interval": 2e-4}))
+                "Constants/cells": n, STEP: 1e-3 / n, "Seepage inertia": inertia, "Output/Statistics interval": 2e-4}))
             p = run.table("probes.csv")
             errors.append([abs(a / b - 1.) for a, b in zip(fit_decay(p["time"], p["middle/velocity y"], exact), exact)])
         c.below(form + ": imaginary part at 40 cells a wave length", errors[0][1], 2e-3)
