@@ -514,33 +514,6 @@ void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
 }
 
 template <int dim>
-void UpSolver<dim>::book_work(const TimeLevel &level, const double share,
-                              const dealii::TrilinosWrappers::MPI::Vector &motion)
-{
-  ghosted_motion.block(0) = motion;
-  const VolumeLoads<dim> volume = volume_loads(level.time);
-  dealii::Tensor<1, dim> weight;
-  double gravity_work = 0.;
-  StepWork work;
-  for (const auto &body : scene.bodies) {
-    if (volume.gravity.norm() > 0. || !volume.forces.empty())
-      form->sum_weight(*body, ghosted_motion.block(0), volume, level.time, weight, gravity_work);
-    form->book_seepage(*body, level, state, volume.gravity, work);
-  }
-  const auto held = boundary.reactions(level, residual, motion);
-  const auto loads = boundary.loads(level, ghosted_motion.block(0));
-  const double dt = share * level.dt;
-  book.impulse += dt * (held.force + loads.force + weight);
-  book.gross_impulse += dt * (held.gross_force + loads.gross_force + weight.norm());
-  book.external_work += share * (held.work + loads.work + gravity_work);
-  book.gravity_work += share * gravity_work;
-  book.fluid_outflow += dt * (held.outflow + loads.outflow);
-  book.fluid_squeezed += share * work.fluid_squeezed;
-  book.seepage_dissipation += share * work.seepage_dissipation;
-  book.seepage_work += share * work.seepage_work;
-}
-
-template <int dim>
 void UpSolver<dim>::move_tracers()
 {
   if (method == Method::finite_elements) {

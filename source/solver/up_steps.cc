@@ -382,6 +382,33 @@ double UpSolver<dim>::estimated_error(const BlockVector &difference)
   return error;
 }
 
+template <int dim>
+void UpSolver<dim>::book_work(const TimeLevel &level, const double share,
+                              const dealii::TrilinosWrappers::MPI::Vector &motion)
+{
+  ghosted_motion.block(0) = motion;
+  const VolumeLoads<dim> volume = volume_loads(level.time);
+  dealii::Tensor<1, dim> weight;
+  double gravity_work = 0.;
+  StepWork work;
+  for (const auto &body : scene.bodies) {
+    if (volume.gravity.norm() > 0. || !volume.forces.empty())
+      form->sum_weight(*body, ghosted_motion.block(0), volume, level.time, weight, gravity_work);
+    form->book_seepage(*body, level, state, volume.gravity, work);
+  }
+  const auto held = boundary.reactions(level, residual, motion);
+  const auto loads = boundary.loads(level, ghosted_motion.block(0));
+  const double dt = share * level.dt;
+  book.impulse += dt * (held.force + loads.force + weight);
+  book.gross_impulse += dt * (held.gross_force + loads.gross_force + weight.norm());
+  book.external_work += share * (held.work + loads.work + gravity_work);
+  book.gravity_work += share * gravity_work;
+  book.fluid_outflow += dt * (held.outflow + loads.outflow);
+  book.fluid_squeezed += share * work.fluid_squeezed;
+  book.seepage_dissipation += share * work.seepage_dissipation;
+  book.seepage_work += share * work.seepage_work;
+}
+
 namespace {
 /// Applies an action to the rows of all points of scenes.
 template <int dim, typename Action>
@@ -437,6 +464,8 @@ void UpSolver<dim>::reset_displacements()
   template double UpSolver<dim>::try_stages(double);                                                         \
   template double UpSolver<dim>::find_stages(double);                                                        \
   template std::array<double, 2> UpSolver<dim>::mean_at_points(const BlockVector &);                         \
+  template void UpSolver<dim>::book_work(const TimeLevel &, double,                                          \
+                                         const dealii::TrilinosWrappers::MPI::Vector &);                     \
   template double UpSolver<dim>::estimated_error(const BlockVector &);                                       \
   template dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const;                       \
   template TimeLevel UpSolver<dim>::stage_level(double, bool) const;
