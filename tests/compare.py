@@ -35,7 +35,8 @@ class Checks:
 class Comparison:
     """One `peat compare` and what it wrote."""
 
-    def __init__(self, peat, scene, directory, first=GIMP, second=Q1, settings=(), ranks=1, environment=()):
+    def __init__(self, peat, scene, directory, first=GIMP, second=Q1, settings=(), ranks=1, environment=(),
+                 code=0):
         command = [peat, "compare", scene, "--quiet", "--output", directory]
         for setting in ("Compare/First=" + first, "Compare/Second=" + second) + tuple(settings):
             command += ["--set", setting]
@@ -45,7 +46,7 @@ class Comparison:
                    OMPI_MCA_rmaps_base_oversubscribe="1", OMP_NUM_THREADS="1")
         own.update(environment)
         done = subprocess.run(command, capture_output=True, text=True, env=own)
-        if done.returncode != 0:
+        if done.returncode != code:
             sys.exit("%s: exit code %d\n%s" % (" ".join(command), done.returncode, done.stderr))
         self.directory, self.output = directory, done.stdout + done.stderr
         self.summary = json.load(open(self.path("summary.json")))
@@ -209,6 +210,27 @@ def check_ranks(check, one, two):
     check("... and count the same cells", [r["compared"] for r in one.rows] == [r["compared"] for r in two.rows])
 
 
+def check_times(check, peat, root):
+    times = Comparison(peat, COLUMN, os.path.join(root, "logarithmic"), settings=(
+        "Constants/cells=10", "Compare/Samples=5", "Compare/Spacing=logarithmic", "Compare/First sample=4e-4",
+        "References/pressure/Times=0.4", "References/pressure/Columns=p(t=0.4 s) [Pa]")).summary["sample_times"]
+    expected = [4e-4 * 1000**(k / 4) for k in range(5)]
+    check("sample times are spaced by factors", len(times) == 5 and all(close(a, b, 1e-9) for a, b in zip(times, expected)))
+
+
+def check_early_end(check, peat, root, with_report):
+    """The second run becomes unstable: exit code 2, and a report up to there."""
+    early = Comparison(peat, COLUMN, os.path.join(root, "early"), Q1, "Explicit MPM/Step factor=1.9",
+                       ("Constants/cells=10", "Compare/Samples=400"), code=2)
+    summary, last = early.summary, early.summary["simulated_time"]
+    check("the run that stopped is named", summary["problems"][0] == "" and "column" in summary["problems"][1] and
+          "run '1.9'" in early.output)
+    check("the report ends before the run does", 0. < last < 0.4 and close(last, summary["sample_times"][-1], 1e-9))
+    check("it has numbers", bool(early.row("cells", "", "pressure")) and early.exists("samples.csv"))
+    if with_report:
+        check("the page says so", "ended early" in open(early.path("report.html")).read())
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--peat", default=os.path.join(HERE, "..", "build", "peat"), help="the program")
@@ -247,6 +269,9 @@ def main():
     check("a dry body has no pressure to compare", not block.row("cells", "block", "pressure") and
           bool(block.row("cells", "ground", "pressure")))
     check_references(check, block)
+
+    check_times(check, peat, root)
+    check_early_end(check, peat, root, with_report)
 
     if not options.keep:
         shutil.rmtree(root)

@@ -236,6 +236,17 @@ def parallel_implicit(c):
             c.below("%s, %d ranks (%s)" % (scene, n, column), difference, 1e-7)
 
 
+def s7(c, sizes=(4, 8, 16)):
+    for name, method in (("points, gimp", {"Explicit MPM/Basis": "gimp"}), ("points, q1", {"Explicit MPM/Basis": "q1"}),
+                         ("elements, q1", FEM)):
+        runs = [c.run("S7_bending", dict(method, **{"Constants/cells": n})) for n in sizes]
+        c.below(name + ": deflection", runs[1].error("deflection", "Linf"), 1e-2)
+        c.order(name + ": deflection", sizes, [r.error("deflection", "L2") for r in runs], 1.8)
+    # Quadratic functions have the solution among them.
+    run = c.run("S7_bending", dict(FEM, **{"Implicit solver/Element": "taylor-hood"}))
+    c.below("taylor-hood: deflection", run.error("deflection", "Linf"), 1e-6)
+
+
 MPM = {"Method": "mpm"}
 # name: (function, labels, seconds on one core); those without a label are long, and run by hand.
 CASES = {
@@ -254,6 +265,7 @@ CASES = {
     "fem_D6": (lambda c: d6(c, 8, FEM, 1e-2), ("full",), 270),
     "fem_D6_points": (lambda c: d6(c, 8, MPM, 5e-2), (), 300),
     "fem_D7": (d7, ("full",), 20),
+    "fem_S7": (s7, ("quick", "full"), 5),
     "rest": (rest, ("full",), 20),
     "parallel_implicit": (parallel_implicit, ("full",), 20),
     "fem_G1": (g1, ("quick", "full"), 5),

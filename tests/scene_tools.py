@@ -55,10 +55,11 @@ class Run:
                 pass
         return columns
 
-    def points(self, body):
-        """Fields of a body's points in the last picture: name -> list of tuples."""
+    def points(self, body, picture=-1):
+        """Fields of a body's points in the last picture, or another one: name -> list of tuples."""
         folder = os.path.join(self.directory, "pictures")
-        return read_vtu(os.path.join(folder, sorted(f for f in os.listdir(folder) if f.startswith(body + "-"))[-1]))
+        names = sorted(f for f in os.listdir(folder) if f.startswith(body + "-"))
+        return read_vtu(os.path.join(folder, names[picture]))
 
 
 def read_table(path, text=False):

@@ -10,7 +10,7 @@ import sys
 
 import scene_tools
 
-IMPLICIT = {"Explicit MPM/Pore pressure": "implicit"}
+IMPLICIT = {"Scheme": "semi-implicit"}
 TABLE = "reference/data/D3_ramp_%sup.csv"
 PROFILES = "reference/data/D3_ramp_%sprofiles_up.csv"
 

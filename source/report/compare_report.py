@@ -162,6 +162,11 @@ def figures(data):
     return sections
 
 
+def problems(data):
+    return "".join("<p class='verdict attention'>The run %s ended early, and what follows ends with it: %s</p>" % (text(label), text(problem))
+                   for label, problem in zip(data.labels, data.summary["problems"]) if problem)
+
+
 def page(data):
     title = "%s: %s and %s" % (data.summary["case"], data.labels[0], data.labels[1])
     intro = "%d-D, %s s simulated, %d sample times, %s. PEAT %s." % (
@@ -171,7 +176,7 @@ def page(data):
              "initial-scale=1'><title>%s</title><style>%s</style></head><body>" % (text(title), STYLE),
              "<h1>%s</h1><p class=quiet>Comparison of %s and %s. %s</p>" % (
                  text(data.summary["case"]), text(data.labels[0]), text(data.labels[1]), text(intro)),
-             verdict(data), "<h2>Where they differ most</h2>", findings(data)]
+             problems(data), verdict(data), "<h2>Where they differ most</h2>", findings(data)]
     sections = figures(data)
     parts += ["<h2>%s</h2>%s" % (text(name), content) for name, content in sections[:1]]
     parts += ["<h2>Cost</h2>", cost(data), "<h2>Differences</h2>", differences(data)]

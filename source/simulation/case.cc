@@ -6,7 +6,7 @@
 #include <sstream>
 
 namespace peat {
-StageParameters::StageParameters(Section section) : name(section.name())
+StageParameters::StageParameters(Section section, const Scheme common) : name(section.name())
 {
   std::string solver_name = "dynamic";
   section.add(
@@ -38,6 +38,10 @@ StageParameters::StageParameters(Section section) : name(section.name())
       "Local damping", local_damping, between(0., 0.99),
       "Share of each node's out-of-balance force that acts against its velocity in this stage; for dynamic "
       "relaxation to rest.");
+  std::string scheme_name = name_of(common);
+  section.add("Scheme", scheme_name, scheme_names(),
+              "Dynamic: that of this stage, if it is another one than the file's.");
+  scheme = scheme_of(scheme_name);
   if (section.describing())
     return;
   if (solver != Solver::static_state)
@@ -49,8 +53,9 @@ StageParameters::StageParameters(Section section) : name(section.name())
   for (const char *key : {"Static state", "Reset displacements"})
     if (solver != Solver::static_state && section.has(key))
       section.fail(key, "belongs to static stages");
-  if (solver != Solver::dynamic && section.has("Local damping"))
-    section.fail("Local damping", "belongs to dynamic stages");
+  for (const char *key : {"Local damping", "Scheme"})
+    if (solver != Solver::dynamic && section.has(key))
+      section.fail(key, "belongs to dynamic stages");
 }
 
 unsigned int read_dimension(const ParameterFile &file)
@@ -170,6 +175,18 @@ Method read_method(Section root)
   return name == "fem" ? Method::fem : Method::mpm;
 }
 
+Scheme read_common_scheme(Section root)
+{
+  std::string name = "auto";
+  root.add("Scheme", name, scheme_names(),
+           "How dynamic stages of material points step in time. 'explicit': many cheap steps, limited by "
+           "undrained waves and by the diffusion of pressures. 'semi-implicit': pore pressures from a linear "
+           "system; only the wave in the skeleton limits the step. 'implicit': motion and pressures from one "
+           "system; steps are as long as 'Implicit solver/Step tolerance' allows. 'auto': the one that is "
+           "estimated to cost least of those that apply.");
+  return scheme_of(name);
+}
+
 SchemeParameters read_scheme(Section root)
 {
   SchemeParameters scheme(root.subsection("Explicit MPM"));
@@ -224,9 +241,9 @@ Case<dim>::Case(const ParameterFile &file)
       contacts(read_contacts<dim>(file.root().subsection("Contacts"), names(bodies), names(rigid_bodies))),
       conditions(read_conditions<dim>(file.root().subsection("Conditions"), names(bodies))),
       gravity(read_gravity<dim>(file.root())), method(read_method(file.root())),
-      scheme(read_scheme(file.root())), implicit(file.root().subsection("Implicit solver")),
-      linear(file.root().subsection("Linear solver")),
-      stages(read_list<StageParameters>(file.root().subsection("Stages"), "STAGE")),
+      common_scheme(read_common_scheme(file.root())), scheme(read_scheme(file.root())),
+      implicit(file.root().subsection("Implicit solver")), linear(file.root().subsection("Linear solver")),
+      stages(read_list<StageParameters>(file.root().subsection("Stages"), "STAGE", common_scheme)),
       probes(read_list<ProbeParameters<dim>>(file.root().subsection("Probes"), "PROBE")),
       references(read_list<ReferenceParameters<dim>>(file.root().subsection("References"), "REFERENCE",
                                                      names(probes))),
@@ -340,7 +357,7 @@ void Case<dim>::check(const Section &root) const
       root.subsection("Materials").subsection(body.material).fail("", message.str());
     }
   }
-  check_implicit_pressure(root);
+  check_schemes(root);
   for (const auto &stage : stages)
     if (method == Method::fem && stage.local_damping > 0.)
       root.subsection("Stages")
@@ -357,13 +374,6 @@ void Case<dim>::check(const Section &root) const
     rigid_bodies.front().section.fail(
         "", "rigid bodies act on material points by contact; finite elements do not "
             "have it");
-  for (const auto &condition : conditions)
-    if (condition->has_fluid_source() && method == Method::mpm &&
-        std::any_of(stages.begin(), stages.end(),
-                    [](const auto &stage) { return stage.solver == StageParameters::Solver::dynamic; }))
-      condition->section.fail("Kind",
-                              "the explicit step of material points knows no fluid sources; use 'Method "
-                              "= fem', or quasi-static stages");
   for (const auto &condition : conditions)
     if (condition->concerns_fluid() && !is_saturated())
       condition->section.fail("Kind", "condition '" + condition->name +
@@ -384,32 +394,101 @@ void Case<dim>::check(const Section &root) const
 }
 
 template <int dim>
-void Case<dim>::check_implicit_pressure(const Section &root) const
+std::string Case<dim>::why_not_semi_implicit() const
 {
-  if (!scheme.implicit_pressure)
-    return;
-  const Section section = root.subsection("Explicit MPM");
   if (!is_saturated())
-    section.fail("Pore pressure", "'implicit' is for saturated bodies, and there is none");
+    return "it is for saturated bodies, and there is none";
   if (!contacts.empty())
-    section.fail("Pore pressure", "'implicit' does not go with 'Contacts' yet; use 'explicit'");
-  double alpha = -1.;
+    return "it does not go with 'Contacts' yet";
+  if (!scheme.pressure_of_cells)
+    return "it has one pressure a cell, but 'Explicit MPM/Pressure = point'";
+  const Mixture *first = nullptr;
   for (const auto &body : bodies)
     if (const Mixture *mixture = material(body.material).mixture()) {
-      if (alpha >= 0. && mixture->biot_coefficient() != alpha)
-        section.fail("Pore pressure",
-                     "'implicit' needs the same 'Biot coefficient' in all saturated bodies; that of '" +
-                         body.name + "' differs");
-      alpha = mixture->biot_coefficient();
+      if (first && mixture->biot_coefficient() != first->biot_coefficient())
+        return "it needs the same 'Biot coefficient' in all saturated bodies; that of '" + body.name +
+               "' differs";
+      first = mixture;
     }
+  return "";
+}
+
+template <int dim>
+std::string Case<dim>::why_not_implicit(const StageParameters &stage) const
+{
+  if (!contacts.empty())
+    return "it does not go with 'Contacts' yet";
+  if (!rigid_bodies.empty())
+    return "rigid bodies do not act on it yet";
+  if (std::max(scheme.local_damping, stage.local_damping) > 0.)
+    return "it does not have 'Local damping'";
+  if (scheme.grid_velocity || scheme.relaxation_time > 0.)
+    return "it has no 'Transfer = pic' and no 'Relaxation time'";
+  return "";
+}
+
+template <int dim>
+std::string Case<dim>::why_not(const Scheme wanted, const StageParameters &stage) const
+{
+  if (wanted == Scheme::implicit)
+    return why_not_implicit(stage);
+  for (const auto &condition : conditions)
+    if (condition->has_fluid_source())
+      return "it knows no fluid sources, as condition '" + condition->name + "'";
+  return wanted == Scheme::semi_implicit ? why_not_semi_implicit() : "";
+}
+
+template <int dim>
+bool Case<dim>::may_have(const Scheme wanted) const
+{
+  return method == Method::mpm && std::any_of(stages.begin(), stages.end(), [&](const auto &stage) {
+           return stage.solver == StageParameters::Solver::dynamic &&
+                  (stage.scheme == wanted ||
+                   (stage.scheme == Scheme::automatic && why_not(wanted, stage).empty()));
+         });
+}
+
+template <int dim>
+void Case<dim>::check_schemes(const Section &root) const
+{
+  if (method == Method::fem)
+    return;
+  for (const auto &stage : stages) {
+    if (stage.solver != StageParameters::Solver::dynamic)
+      continue;
+    const Section own = root.subsection("Stages").subsection(stage.name);
+    const Section where = own.has("Scheme") ? own : root;
+    if (stage.scheme != Scheme::automatic) {
+      const std::string reason = why_not(stage.scheme, stage);
+      if (!reason.empty())
+        where.fail("Scheme", in_quotes(name_of(stage.scheme)) + ": " + reason);
+      continue;
+    }
+    std::string reasons;
+    for (const Scheme one : {Scheme::explicit_steps, Scheme::semi_implicit, Scheme::implicit}) {
+      const std::string reason = why_not(one, stage);
+      if (reason.empty()) {
+        reasons.clear();
+        break;
+      }
+      reasons += (reasons.empty() ? "" : "; ") + in_quotes(name_of(one)) + ": " + reason;
+    }
+    if (!reasons.empty())
+      where.fail("Scheme", "no scheme applies to stage " + in_quotes(stage.name) + ": " + reasons);
+  }
+  const Section section = root.subsection("Explicit MPM");
+  if (!may_have(Scheme::semi_implicit))
+    for (const char *key : {"Pressure stabilisation", "Pressure tolerance"})
+      if (section.has(key))
+        section.fail(key, "is for 'Scheme = semi-implicit'");
 }
 
 template <int dim>
 bool Case<dim>::is_implicit() const
 {
-  return method == Method::fem || std::any_of(stages.begin(), stages.end(), [](const auto &stage) {
-           return stage.solver != StageParameters::Solver::dynamic;
-         });
+  return method == Method::fem || may_have(Scheme::implicit) ||
+         std::any_of(stages.begin(), stages.end(),
+                     [](const auto &stage) { return stage.solver != StageParameters::Solver::dynamic; });
 }
 
 template <int dim>
@@ -419,6 +498,7 @@ SchemeFields Case<dim>::fields() const
     return gauss_fields();
   SchemeFields fields = scheme.fields();
   fields.surface_depth = !contacts.empty();
+  fields.pressure_rate = may_have(Scheme::semi_implicit);
   return fields;
 }
 

@@ -1,8 +1,10 @@
+#include <peat/base/text.h>
 #include <peat/simulation/commands.h>
 #include <peat/simulation/simulation.h>
 
 #include <deal.II/base/mpi.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
@@ -62,6 +64,45 @@ std::string describe_elements(const Case<dim> &parameters, const Grid<dim> &grid
   return text.str();
 }
 
+/// What a scene of material points consists of.
+template <int dim>
+std::string describe_points(const Case<dim> &parameters, const Grid<dim> &grid, const Scene<dim> &scene,
+                            const std::size_t n_own_cells)
+{
+  std::ostringstream text;
+  text << (parameters.title.empty() ? "case" : parameters.title) << ": " << dim << "-D, "
+       << dealii::Utilities::MPI::n_mpi_processes(grid.communicator()) << " rank(s)\n";
+  for (const auto &body : scene.bodies)
+    text << "body '" << body->name() << "': " << body->n_global_points() << " points of '"
+         << body->material().name() << "', " << body->layout().n_columns << " values each\n";
+  for (const auto &rigid : scene.rigid_bodies) {
+    text << "rigid body '" << rigid->name() << "': ";
+    if (rigid->is_prescribed())
+      text << "prescribed motion\n";
+    else
+      text << rigid->mass() << (dim == 2 ? " kg/m\n" : " kg\n");
+  }
+  text << "cells: " << grid.triangulation().n_global_active_cells() << ", of them "
+       << dealii::Utilities::MPI::sum(n_own_cells, grid.communicator()) << " hold points\n";
+  dealii::Utilities::System::MemoryStats memory;
+  dealii::Utilities::System::get_memory_stats(memory);
+  text << "memory of this process: " << readable_bytes(1024. * memory.VmRSS);
+  return text.str();
+}
+
+std::string describe_stage(const StageParameters &stage)
+{
+  switch (stage.solver) {
+  case StageParameters::Solver::static_state:
+    return "static";
+  case StageParameters::Solver::quasi_static:
+    return to_text(stage.duration) + " s, quasi-static, steps as long as changes allow";
+  default:
+    return to_text(stage.duration) +
+           " s, dynamic; schemes, the one to be taken marked, costs in explicit steps:";
+  }
+}
+
 template <int dim>
 int check(const ParameterFile &file, const RunOptions &options, MPI_Comm communicator)
 {
@@ -77,39 +118,35 @@ int check(const ParameterFile &file, const RunOptions &options, MPI_Comm communi
   }
   ExplicitMPM<dim> solver(parameters.scheme, grid, scene, 0.);
   solver.prepare();
+  log.line(describe_points(parameters, grid, scene, solver.nodes().occupied_cells().size()));
 
-  std::size_t n_active = solver.nodes().occupied_cells().size();
-  n_active = dealii::Utilities::MPI::sum(n_active, communicator);
-  std::ostringstream text;
-  text << (parameters.title.empty() ? "case" : parameters.title) << ": " << dim << "-D, "
-       << dealii::Utilities::MPI::n_mpi_processes(communicator) << " rank(s)\n";
-  for (const auto &body : scene.bodies)
-    text << "body '" << body->name() << "': " << body->n_global_points() << " points of '"
-         << body->material().name() << "', " << body->layout().n_columns << " values each\n";
-  for (const auto &rigid : scene.rigid_bodies) {
-    text << "rigid body '" << rigid->name() << "': ";
-    if (rigid->is_prescribed())
-      text << "prescribed motion\n";
-    else
-      text << rigid->mass() << (dim == 2 ? " kg/m\n" : " kg\n");
+  // Stages count as if they began with the points at their places of the start.
+  double start = 0., cost = 0.;
+  bool measurable = true;
+  for (const auto &stage : parameters.stages) {
+    log.line("stage '" + stage.name + "': " + describe_stage(stage));
+    if (stage.solver == StageParameters::Solver::dynamic) {
+      const Demand asked = demand(parameters, stage, scene, grid, start);
+      const auto list = estimate_schemes(parameters, stage, scene, grid, asked);
+      const SchemeEstimate &taken = *std::find_if(list.begin(), list.end(), [&](const auto &one) {
+        return stage.scheme == Scheme::automatic || one.scheme == stage.scheme;
+      });
+      for (const auto &estimate : list)
+        log.line((&estimate == &taken ? "  * " : "    ") + describe(estimate));
+      if (asked.waves)
+        log.line("    waves count, since " + asked.why);
+      cost += taken.cost;
+      measurable = measurable && parameters.why_not(Scheme::explicit_steps, stage).empty();
+    }
+    start += stage.duration;
   }
-  text << "cells: " << grid.triangulation().n_global_active_cells() << ", of them " << n_active
-       << " hold points\n";
-
-  dealii::Utilities::System::MemoryStats memory;
-  dealii::Utilities::System::get_memory_stats(memory);
-  text << "memory of this process: " << readable_bytes(1024. * memory.VmRSS) << '\n';
-
+  if (cost == 0. || !measurable)
+    return exit_success;
   const StableStep stable = solver.stable_step();
-  const double dt = parameters.scheme.fixed_step > 0. ? parameters.scheme.fixed_step
-                                                      : parameters.scheme.step_factor * stable.dt;
-  const double n_steps = std::ceil(parameters.end_time() / dt);
-  text << "stable step: " << stable.dt << " s, limit: " << stable.limit << '\n'
-       << "steps: about " << n_steps << " of " << dt << " s for " << parameters.end_time() << " s";
-  log.line(text.str());
-  const double cost = measure_step(solver, std::min(dt, stable.dt), n_steps, communicator);
-  log.line("run time: about " + readable_duration(n_steps * cost) + " without output (" +
-           readable_duration(cost) + " a step, measured now)");
+  const double step = measure_step(solver, parameters.scheme.step_factor * stable.dt, cost, communicator);
+  log.line("stable explicit step: " + to_text(stable.dt) + " s, limit: " + stable.limit + "; takes " +
+           readable_duration(step) + ", measured now");
+  log.line("run time of the dynamic stages: about " + readable_duration(cost * step) + " without output");
   return exit_success;
 }
 } // namespace

@@ -141,7 +141,7 @@ void add_reference_differences(const Case<dim> &parameters, const Comparison<dim
   }
 }
 
-/// Runs the case with what one run sets. Returns false if a signal ended it.
+/// Runs the case with what one run sets, as far as it goes. Returns false if a signal ended it.
 template <int dim>
 bool run_one(const RunOptions &options, const CompareParameters &compare, ComparedRun &run,
              const bool is_first, std::vector<Difference> &against_references, MPI_Comm communicator)
@@ -151,26 +151,48 @@ bool run_one(const RunOptions &options, const CompareParameters &compare, Compar
   RunOptions own = options;
   own.output = run.directory;
   const Comparison<dim> references(parameters, std::filesystem::path(options.file).parent_path().string());
-  Recorder<dim> recorder(parameters,
-                         sample_times(compare.n_samples, parameters.end_time(), references.times()));
+  Recorder<dim> recorder(parameters, sample_times(compare, parameters.end_time(), references.times()));
   Simulation<dim> simulation(parameters, file, own, communicator, &recorder);
   try {
     if (!simulation.run())
       return false;
   } catch (const NumericalError &error) {
-    throw NumericalError("run '" + run.name + "' (" + run.settings + "): " + error.what());
+    run.problem = error.what();
   }
   run.recording = recorder.recording();
   add_reference_differences(parameters, simulation.references(), run.name, against_references);
   return true;
 }
 
+/// Leave of both recordings the times that both have; returns the last of them, or 0.
+double trim_recordings(std::array<ComparedRun, 2> &runs)
+{
+  const std::size_t n = std::min(runs[0].recording.times.size(), runs[1].recording.times.size());
+  for (ComparedRun &run : runs) {
+    run.recording.times.resize(n);
+    run.recording.samples.resize(n);
+  }
+  return n > 0 ? runs[0].recording.times.back() : 0.;
+}
+
+/// Leave of a history what lies before a time.
+Histories until(Histories histories, const double end)
+{
+  const std::size_t n = std::upper_bound(histories.time.begin(), histories.time.end(), end * (1. + 1e-9)) -
+                        histories.time.begin();
+  histories.time.resize(n);
+  for (auto &column : histories.columns)
+    column.resize(n);
+  return histories;
+}
+
 void add_run_differences(ComparisonData &data, const double stiffness)
 {
   auto &runs = data.runs;
   std::vector<Difference> list = compare_cells(runs[0].recording, runs[1].recording, data.tolerance);
-  const auto probes = compare_histories(read_histories(runs[0].directory + "/probes.csv"),
-                                        read_histories(runs[1].directory + "/probes.csv"), data.tolerance);
+  const auto probes = compare_histories(
+      until(read_histories(runs[0].directory + "/probes.csv"), data.end_time),
+      until(read_histories(runs[1].directory + "/probes.csv"), data.end_time), data.tolerance);
   list.insert(list.end(), probes.begin(), probes.end());
   double mesh_size = 0.;
   for (const auto &planes : runs[0].recording.planes)
@@ -216,7 +238,6 @@ void evaluate(const Case<dim> &parameters, const RunOptions &options, Comparison
   Log log(data.directory, true, options.quiet);
   data.title = parameters.title.empty() ? options.file : parameters.title;
   data.tolerance = parameters.compare.tolerance;
-  data.end_time = parameters.end_time();
   data.dimension = dim;
   double stiffness = 0.;
   for (const auto &material : parameters.materials)
@@ -251,8 +272,21 @@ int compare(const ParameterFile &file, const RunOptions &options, MPI_Comm commu
     if (!run_one<dim>(options, parameters.compare, run, r == 0, data.differences, communicator))
       return exit_interrupted;
   }
-  if (first_rank)
+  std::string problems;
+  for (const ComparedRun &run : data.runs)
+    if (!run.problem.empty())
+      problems +=
+          (problems.empty() ? "run '" : "; run '") + run.name + "' (" + run.settings + "): " + run.problem;
+  data.end_time = parameters.end_time();
+  if (!problems.empty())
+    data.end_time = trim_recordings(data.runs);
+  data.end_time = dealii::Utilities::MPI::broadcast(communicator, data.end_time);
+  if (first_rank && data.end_time > 0.)
     evaluate(parameters, options, data);
+  if (!problems.empty())
+    throw NumericalError(problems + (data.end_time > 0.
+                                         ? "; the report ends at t = " + to_text(data.end_time) + " s"
+                                         : "; the runs have no sample in common"));
   return exit_success;
 }
 } // namespace

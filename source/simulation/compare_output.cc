@@ -315,6 +315,7 @@ void write_compare_summary(const ComparisonData &data, const Sights &sights, con
   summary["methods"] = {data.runs[0].name, data.runs[1].name};
   summary["labels"] = {data.runs[0].label, data.runs[1].label};
   summary["settings"] = {data.runs[0].settings, data.runs[1].settings};
+  summary["problems"] = {data.runs[0].problem, data.runs[1].problem};
   summary["tolerance"] = data.tolerance;
   summary["simulated_time"] = data.end_time;
   summary["sample_times"] = recording.times;

@@ -16,6 +16,7 @@ struct ComparedRun
   std::string name;     ///< of its directory and in files: "mpm"
   std::string label;    ///< for people: "CMPM"
   std::string directory;
+  std::string problem; ///< why it ended early; "": it did not
   Recording recording; ///< on rank 0
 };
 

@@ -1,5 +1,6 @@
 #include <peat/simulation/recorder.h>
 
+#include <peat/base/text.h>
 #include <peat/simulation/case.h>
 #include <peat/simulation/fields.h>
 #include <peat/solver/explicit_mpm.h>
@@ -7,6 +8,7 @@
 #include <deal.II/base/mpi.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -14,8 +16,17 @@ namespace peat {
 CompareParameters::CompareParameters(Section section) : section(section)
 {
   section.add("Samples", n_samples, between(1, 10000),
-              "Number of equally spaced times at which 'peat compare' samples both runs; the times of the "
+              "Number of times at which 'peat compare' samples both runs; the times of the "
               "references come on top.");
+  std::string spacing = "linear";
+  section.add("Spacing", spacing, {"linear", "logarithmic"},
+              "Of these times. 'logarithmic': each is later than the one before by the same factor, as for "
+              "consolidation.");
+  logarithmic = spacing == "logarithmic";
+  section.add("First sample", first_sample, nonnegative("s"),
+              "First of the times that are spaced logarithmically; 0: a ten-thousandth of the run.");
+  if (!section.describing() && !logarithmic && section.has("First sample"))
+    section.fail("First sample", "is for 'Spacing = logarithmic'");
   section.add("Tolerance", tolerance, strictly_between(0., 1.),
               "Relative differences above it are explained in the report of 'peat compare'.");
   section.add("First", first,
@@ -47,11 +58,18 @@ double Recording::volume(const std::uint64_t cell) const
   return product;
 }
 
-std::vector<double> sample_times(const unsigned int n, const double end, const std::vector<double> &others)
+std::vector<double> sample_times(const CompareParameters &compare, const double end,
+                                 const std::vector<double> &others)
 {
+  const unsigned int n = compare.n_samples;
+  const double first = compare.first_sample > 0. ? compare.first_sample : 1e-4 * end;
+  if (compare.logarithmic && first >= end)
+    compare.section.fail("First sample", "the run ends at " + to_text(end) + " s");
   std::vector<double> times = others;
-  for (unsigned int k = 1; k <= n; ++k)
-    times.push_back(end * k / n);
+  for (unsigned int k = 1; k < n; ++k)
+    times.push_back(compare.logarithmic ? first * std::pow(end / first, double(k - 1) / (n - 1))
+                                        : end * k / n);
+  times.push_back(end);
   std::sort(times.begin(), times.end());
   const auto same = [&](const double a, const double b) { return b - a <= 1e-9 * end; };
   times.erase(std::unique(times.begin(), times.end(), same), times.end());

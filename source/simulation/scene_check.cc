@@ -261,8 +261,11 @@ void check_probes(const Case<dim> &parameters, const Grid<dim> &grid)
 template <int dim>
 void check_fixed_step(const Case<dim> &parameters, const Scene<dim> &scene, const Grid<dim> &grid)
 {
-  const StableStep stable = stable_step<dim>(scene.bodies, grid, parameters.scheme.seepage_inertia,
-                                             parameters.scheme.implicit_pressure);
+  // Of stages that choose their scheme the longest step counts.
+  const bool semi = parameters.may_have(Scheme::semi_implicit);
+  if (!semi && !parameters.may_have(Scheme::explicit_steps))
+    return;
+  const StableStep stable = stable_step<dim>(scene.bodies, grid, parameters.scheme.seepage_inertia, semi);
   if (parameters.scheme.fixed_step <= stable.dt)
     return;
   std::ostringstream message;

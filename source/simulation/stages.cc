@@ -2,6 +2,7 @@
 #include <peat/simulation/simulation.h>
 #include <peat/solver/rest_pressure.h>
 
+#include <algorithm>
 #include <sstream>
 
 #include "outputs.h"
@@ -11,9 +12,14 @@ template <int dim>
 void Simulation<dim>::run_stage(const StageParameters &stage, const double start)
 {
   bring_in_bodies(stage);
-  const bool implicit = parameters.method == Method::fem || stage.solver != StageParameters::Solver::dynamic;
-  outputs->plan(parameters.output, comparison, recorder, start, start + stage.duration,
-                stage.solver == StageParameters::Solver::quasi_static);
+  const bool dynamic = stage.solver == StageParameters::Solver::dynamic;
+  SchemeEstimate chosen;
+  if (dynamic && parameters.method == Method::mpm)
+    chosen = choose_scheme(stage, start);
+  const bool implicit = parameters.method == Method::fem || !dynamic || chosen.scheme == Scheme::implicit;
+  note_scheme(implicit ? Scheme::implicit : chosen.scheme);
+  const bool fits_steps = implicit && (parameters.method == Method::mpm || !dynamic);
+  outputs->plan(parameters.output, comparison, recorder, start, start + stage.duration, fits_steps);
   if (parameters.method == Method::mpm && implicit && !scene.contacts.empty())
     log.line("stage '" + stage.name +
              "': implicit, so bodies are tied where they meet, and rigid bodies do not act");
@@ -22,7 +28,34 @@ void Simulation<dim>::run_stage(const StageParameters &stage, const double start
   else if (implicit)
     run_implicit_stage(stage, start);
   else
-    run_explicit_stage(stage, start);
+    run_explicit_stage(stage, start, chosen);
+}
+
+template <int dim>
+SchemeEstimate Simulation<dim>::choose_scheme(const StageParameters &stage, const double start)
+{
+  if (stage.scheme != Scheme::automatic) {
+    SchemeEstimate named;
+    named.scheme = stage.scheme;
+    return named;
+  }
+  const Demand asked = demand(parameters, stage, scene, grid, start);
+  const auto list = estimate_schemes(parameters, stage, scene, grid, asked);
+  if (!list.front().why_not.empty())
+    throw NumericalError("no scheme applies to stage '" + stage.name + "': " + describe(list[0]) + "; " +
+                         describe(list[1]) + "; " + describe(list[2]));
+  log.line("stage '" + stage.name + "': scheme chosen, costs in explicit steps: " + describe(list[0]) +
+           (asked.waves ? "; waves count, since " + asked.why : ""));
+  log.line("    others: " + describe(list[1]) + "; " + describe(list[2]));
+  return list.front();
+}
+
+template <int dim>
+void Simulation<dim>::note_scheme(const Scheme scheme)
+{
+  const std::string name = name_of(scheme);
+  if (std::find(schemes.begin(), schemes.end(), name) == schemes.end())
+    schemes.push_back(name);
 }
 
 template <int dim>
@@ -239,9 +272,12 @@ void check_step_factor(const SchemeParameters &scheme, const Balances<dim> &bala
 } // namespace
 
 template <int dim>
-void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const double start)
+void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const double start,
+                                         const SchemeEstimate &estimate)
 {
   const double end = start + stage.duration;
+  stage_scheme.implicit_pressure = estimate.scheme == Scheme::semi_implicit;
+  stage_scheme.largest_step = estimate.largest_step;
   stage_scheme.local_damping = std::max(parameters.scheme.local_damping, stage.local_damping);
   const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
   up_solver = nullptr;
@@ -262,8 +298,9 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
       stable = mpm.stable_step();
       steps_since_check = 0;
     }
-    const double wanted =
-        stage_scheme.fixed_step > 0. ? stage_scheme.fixed_step : stage_scheme.step_factor * stable.dt;
+    const double wanted = stage_scheme.fixed_step > 0.
+                              ? stage_scheme.fixed_step
+                              : std::min(stage_scheme.step_factor * stable.dt, stage_scheme.largest_step);
     if (stage_scheme.fixed_step > stable.dt) {
       std::ostringstream message;
       message << "'Time step' " << wanted << " s is above the stable step " << stable.dt << " s ("

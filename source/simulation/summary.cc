@@ -1,3 +1,4 @@
+#include <peat/base/text.h>
 #include <peat/simulation/simulation.h>
 
 #include <deal.II/base/mpi.h>
@@ -45,9 +46,7 @@ void Simulation<dim>::write_summary() const
   summary["case"] = parameters.title.empty() ? options.file : parameters.title;
   const bool fem = parameters.method == Method::fem;
   summary["method"] = fem ? "fem" : "mpm";
-  summary["scheme"] = unknowns_of_solver() > 0   ? "implicit"
-                      : pressure_work.solves > 0 ? "semi-implicit"
-                                                 : "explicit";
+  summary["scheme"] = join(schemes);
   summary["dimension"] = dim;
   summary["ranks"] = n_ranks;
   summary["completed"] = !stopped && now >= planned_end;

@@ -239,8 +239,11 @@ void FormCell<dim, reach>::find_rates(const Body<dim> &body, const TimeLevel &le
   for (unsigned int c = 0; c < 9; ++c)
     at.velocity_gradient[c] += level.velocity * of_step[c];
   at.velocity_divergence = at.velocity_gradient[0] + at.velocity_gradient[4] + at.velocity_gradient[8];
-  for (unsigned int d = 0; d < dim; ++d)
+  for (unsigned int d = 0; d < dim; ++d) {
     at.acceleration[d] = level.acceleration * points.value(nodal.U, d) + points.value(nodal.a_history, d);
+    if (level.old_velocity != 0.)
+      at.acceleration[d] += level.old_velocity * points.load(layout.velocity + d);
+  }
 
   at.old_pressure = layout.pressure >= 0 ? points.load(layout.pressure) : Lanes{};
   at.pressure = broadcast(mean_pressure);

@@ -189,7 +189,12 @@ void FormPoints<dim, reach>::deform(Body<dim> &body, const GradientLanes &h, con
   if (layout.porosity >= 0)
     store(layout.porosity, 1. - (1. - load(layout.porosity)) / J);
   store(layout.volume, load(layout.volume) * J);
-  for (unsigned int d = 0; d < dim && move && layout.extent >= 0; ++d)
-    store(layout.extent + d, load(layout.extent + d) * (1. + h[4 * d]));
+  // By the lengths of the domain's edges, which large rotations leave as they are.
+  for (unsigned int d = 0; d < dim && move && layout.extent >= 0; ++d) {
+    Lanes squared = {};
+    for (unsigned int e = 0; e < dim; ++e)
+      squared += (h[3 * e + d] + (e == d)) * (h[3 * e + d] + (e == d));
+    store(layout.extent + d, load(layout.extent + d) * sqrt(squared));
+  }
 }
 } // namespace peat

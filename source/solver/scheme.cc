@@ -1,8 +1,26 @@
 #include <peat/solver/scheme.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace peat {
+const std::vector<std::string> &scheme_names()
+{
+  static const std::vector<std::string> names = {"auto", "explicit", "semi-implicit", "implicit"};
+  return names;
+}
+
+Scheme scheme_of(const std::string &name)
+{
+  const auto &names = scheme_names();
+  return static_cast<Scheme>(std::find(names.begin(), names.end(), name) - names.begin());
+}
+
+std::string name_of(const Scheme scheme)
+{
+  return scheme_names()[static_cast<unsigned int>(scheme)];
+}
+
 SchemeParameters::SchemeParameters(Section section)
 {
   std::string basis_name = "gimp", transfer = "aflip", update = "auto";
@@ -37,25 +55,11 @@ SchemeParameters::SchemeParameters(Section section)
       "there; "
       "does not lock. 'point': each point on its own; locks in 2-D and 3-D with more than one point a cell.");
   pressure_of_cells = pressure == "cell";
-  std::string pore_pressure = "explicit";
-  section.add("Pore pressure", pore_pressure, {"explicit", "implicit"},
-              "How the pore pressure of a step is found. 'explicit': point by point; the step is limited by "
-              "undrained "
-              "waves and by diffusion. 'implicit': with the flow and the motion that it causes, from a "
-              "linear system; "
-              "only the wave in the skeleton limits the step.");
-  implicit_pressure = pore_pressure == "implicit";
   section.add("Pressure stabilisation", pressure_stabilisation, nonnegative(""),
-              "Implicit pore pressure: factor on the term that keeps pressures of neighbouring cells from "
+              "Semi-implicit: factor on the term that keeps pressures of neighbouring cells from "
               "alternating; it acts on increments alone, and vanishes where they are linear in place.");
   section.add("Pressure tolerance", pressure_tolerance, strictly_between(0., 1.),
-              "Implicit pore pressure: residual of the linear system over its right-hand side.");
-  if (!section.describing() && !implicit_pressure)
-    for (const char *key : {"Pressure stabilisation", "Pressure tolerance"})
-      if (section.has(key))
-        section.fail(key, "is for 'Pore pressure = implicit'");
-  if (!section.describing() && implicit_pressure && !pressure_of_cells)
-    section.fail("Pressure", "'Pore pressure = implicit' has one pressure a cell: 'Pressure = cell'");
+              "Semi-implicit: residual of the linear system over its right-hand side.");
   section.add("Pressure filter", pressure_filter, nonnegative(""),
               "Rate, in units of c_u/h, at which pore pressures of points go to the mean of their cell; "
               "conserves the "

@@ -285,7 +285,7 @@ void UpBoundary<dim>::assemble(const TimeLevel &level, const StepState &state, B
                                BlockMatrix *matrix)
 {
   acting = Reactions();
-  add_surface_forces(level, state, residual);
+  add_surface_forces(level, residual);
   if (!space.has_pressure())
     return;
   add_fluxes(level, residual);
@@ -293,8 +293,8 @@ void UpBoundary<dim>::assemble(const TimeLevel &level, const StepState &state, B
 }
 
 template <int dim>
-void UpBoundary<dim>::add_surface_forces(const TimeLevel &level, const StepState &state,
-                                         BlockVector &residual)
+template <typename Action>
+void UpBoundary<dim>::for_each_force(const double time, const Action &action) const
 {
   for (const auto &condition : scene.conditions) {
     if (condition->surface_of().empty())
@@ -302,19 +302,36 @@ void UpBoundary<dim>::add_surface_forces(const TimeLevel &level, const StepState
     for (const Piece &piece : pieces) {
       if (piece.body->name() != condition->surface_of())
         continue;
-      const auto force = condition->force(piece.point, level.time);
-      if (force.norm_square() == 0.)
-        continue;
-      for (std::size_t i = 0; i < piece.N.size(); ++i)
-        for (unsigned int d = 0; d < dim; ++d) {
-          const Index unknown = piece.displacement[i] + d;
-          residual.block(0)(unknown) += piece.N[i] * force[d];
-          acting.work += piece.N[i] * force[d] * state.unknown.block(0)(unknown);
-        }
-      acting.force += force;
-      acting.gross_force += force.norm();
+      const auto force = condition->force(piece.point, time);
+      if (force.norm_square() > 0.)
+        action(piece, force);
     }
   }
+}
+
+template <int dim>
+void UpBoundary<dim>::add_surface_forces(const TimeLevel &level, BlockVector &residual)
+{
+  for_each_force(level.time, [&](const Piece &piece, const dealii::Tensor<1, dim> &force) {
+    for (std::size_t i = 0; i < piece.N.size(); ++i)
+      for (unsigned int d = 0; d < dim; ++d)
+        residual.block(0)(piece.displacement[i] + d) += piece.N[i] * force[d];
+    acting.force += force;
+    acting.gross_force += force.norm();
+  });
+}
+
+template <int dim>
+typename UpBoundary<dim>::Reactions
+UpBoundary<dim>::loads(const TimeLevel &level, const dealii::TrilinosWrappers::MPI::Vector &motion) const
+{
+  Reactions sum = acting;
+  for_each_force(level.time, [&](const Piece &piece, const dealii::Tensor<1, dim> &force) {
+    for (std::size_t i = 0; i < piece.N.size(); ++i)
+      for (unsigned int d = 0; d < dim; ++d)
+        sum.work += piece.N[i] * force[d] * motion(piece.displacement[i] + d);
+  });
+  return sum;
 }
 
 template <int dim>
@@ -394,15 +411,15 @@ void UpBoundary<dim>::add_penalties(const TimeLevel &level, const StepState &sta
 }
 
 template <int dim>
-typename UpBoundary<dim>::Reactions UpBoundary<dim>::reactions(const TimeLevel &level,
-                                                               const BlockVector &residual,
-                                                               const BlockVector &unknown) const
+typename UpBoundary<dim>::Reactions
+UpBoundary<dim>::reactions(const TimeLevel &level, const BlockVector &residual,
+                           const dealii::TrilinosWrappers::MPI::Vector &moved) const
 {
   Reactions sum;
   for (const Motion &motion : motions)
     if (space.owned()[0].is_element(motion.unknown)) {
       const double force = -residual.block(0)(motion.unknown);
-      sum.work += force * unknown.block(0)(motion.unknown);
+      sum.work += force * moved(motion.unknown);
       sum.force[motion.component] += force;
       sum.gross_force += std::abs(force);
     }

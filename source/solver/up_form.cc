@@ -21,13 +21,17 @@ public:
   void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
                 const VolumeLoads<dim> &loads, double stabilisation, const UpSystem &system) override;
   void update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
-                     const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity, bool move,
-                     StepWork &work) override;
+                     const BlockVector &end_velocity, bool move, bool &finite) override;
+  void book_seepage(const Body<dim> &body, const TimeLevel &level, const StepState &state,
+                    const dealii::Tensor<1, dim> &gravity, StepWork &work) override;
   void add_momentum(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &momentum) override;
   void sum_mass(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &mass) override;
   void sum_inertia(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &inertia) override;
-  void sum_weight(const Body<dim> &body, const StepState &state, const VolumeLoads<dim> &loads, double time,
-                  dealii::Tensor<1, dim> &weight, double &work) override;
+  void add_squares(const Body<dim> &body, const BlockVector &field, std::array<double, 2> &squares,
+                   std::array<double, 2> &volumes) override;
+  void sum_weight(const Body<dim> &body, const dealii::TrilinosWrappers::MPI::Vector &motion,
+                  const VolumeLoads<dim> &loads, double time, dealii::Tensor<1, dim> &weight,
+                  double &work) override;
 
 private:
   using Points = FormPoints<dim, reach>;
@@ -215,9 +219,15 @@ void PointForm<dim, reach>::stabilise(const Body<dim> &body, const Slice &slice,
   double h = std::numeric_limits<double>::max();
   for (unsigned int d = 0; d < dim; ++d)
     h = std::min(h, space.grid().size(slice.cell, d));
+  const double softness = compliance(body);
+  // Inertia stiffens the skeleton against what alternates from node to node; waves that steps resolve are not
+  // to feel the term.
+  const double inertia = mixture.density() * h * h / 12. * level.acceleration / level.share;
+  const double yield = std::pow(1. / (1. + inertia * softness), 2);
   const double tau =
-      strength * std::max(0., compliance(body) * 3. * std::pow(mixture.biot_coefficient(), 2) +
-                                  2. * mixture.storage() - 12. * mixture.mobility() * level.dt / (h * h));
+      strength * std::max(0., yield * (softness * 3. * std::pow(mixture.biot_coefficient(), 2) +
+                                       2. * mixture.storage()) -
+                                  12. * mixture.mobility() * level.dt / (h * h));
   if (tau == 0.)
     return;
   for (unsigned int i = 0; i < n_p; ++i)
@@ -327,9 +337,7 @@ void PointForm<dim, reach>::add_split(const TimeLevel &level, const bool has_pre
 
 template <int dim, unsigned int reach>
 void PointForm<dim, reach>::update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
-                                          const BlockVector &end_velocity,
-                                          const dealii::Tensor<1, dim> &gravity, const bool move,
-                                          StepWork &work)
+                                          const BlockVector &end_velocity, const bool move, bool &finite)
 {
   const Layout &layout = body.layout();
   const Mixture *mixture = body.material().mixture();
@@ -339,11 +347,6 @@ void PointForm<dim, reach>::update_points(Body<dim> &body, const TimeLevel &leve
     cell.load(slice.cell, mixture != nullptr, level, state);
     cell.load_end_velocity(slice.cell, end_velocity);
     const auto &values = cell.values();
-    if (values.has_pressure) {
-      cell.evaluate(body, slice, level, 0.);
-      for (std::size_t b = 0; b < cell.n_batches(); ++b)
-        book_seepage(body, cell.points(b), level, cell.state(b), gravity, work);
-    }
     cell.evaluate(body, slice, end, 0.);
     for (std::size_t b = 0; b < cell.n_batches(); ++b) {
       const Points &some = cell.points(b);
@@ -364,9 +367,24 @@ void PointForm<dim, reach>::update_points(Body<dim> &body, const TimeLevel &leve
           for (unsigned int e = 0; e < dim; ++e)
             some.store(layout.velocity_gradient + d * dim + e, L[3 * d + e]);
       }
-      work.finite = work.finite && std::isfinite(sum(check));
+      finite = finite && std::isfinite(sum(check));
       some.deform(body, here.gradient, values.U, move);
     }
+  }
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::book_seepage(const Body<dim> &body, const TimeLevel &level,
+                                         const StepState &state, const dealii::Tensor<1, dim> &gravity,
+                                         StepWork &work)
+{
+  if (!body.material().mixture() || !space.has_pressure())
+    return;
+  for (const Slice &slice : body.slices()) {
+    cell.load(slice.cell, true, level, state);
+    cell.evaluate(body, slice, level, 0.);
+    for (std::size_t b = 0; b < cell.n_batches(); ++b)
+      book_seepage(body, cell.points(b), level, cell.state(b), gravity, work);
   }
 }
 
@@ -435,14 +453,42 @@ void PointForm<dim, reach>::sum_inertia(const Body<dim> &body, dealii::TrilinosW
 }
 
 template <int dim, unsigned int reach>
-void PointForm<dim, reach>::sum_weight(const Body<dim> &body, const StepState &state,
+void PointForm<dim, reach>::add_squares(const Body<dim> &body, const BlockVector &field,
+                                        std::array<double, 2> &squares, std::array<double, 2> &volumes)
+{
+  const bool has_pressure = body.material().mixture() && space.has_pressure();
+  double U[n_u], P[n_p];
+  for (const Slice &slice : body.slices()) {
+    for (unsigned int i = 0; i < n_u; ++i)
+      U[i] = field.block(0)(space.displacements(slice.cell)[i]);
+    for (unsigned int i = 0; i < n_p && has_pressure; ++i)
+      P[i] = field.block(1)(space.pressures(slice.cell)[i] - space.first_pressure());
+    for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
+      const Points points(space.grid(), body, slice, begin);
+      for (unsigned int d = 0; d < dim; ++d) {
+        const Lanes u = points.value(U, d);
+        squares[0] += sum(points.volume * u * u);
+      }
+      volumes[0] += sum(points.volume);
+      if (!has_pressure)
+        continue;
+      const Lanes p = points.pressure(P);
+      squares[1] += sum(points.volume * p * p);
+      volumes[1] += sum(points.volume);
+    }
+  }
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::sum_weight(const Body<dim> &body,
+                                       const dealii::TrilinosWrappers::MPI::Vector &motion,
                                        const VolumeLoads<dim> &loads, const double time,
                                        dealii::Tensor<1, dim> &weight, double &work)
 {
   double U[n_u];
   for (const Slice &slice : body.slices()) {
     for (unsigned int i = 0; i < n_u; ++i)
-      U[i] = state.unknown.block(0)(space.displacements(slice.cell)[i]);
+      U[i] = motion(space.displacements(slice.cell)[i]);
     for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
       const Points points(space.grid(), body, slice, begin);
       for (unsigned int l = 0; l < points.n; ++l) {

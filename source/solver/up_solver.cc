@@ -56,7 +56,7 @@ UpSolver<dim>::UpSolver(const ImplicitParameters &parameters, const LinearSolver
       nearly_incompressible(is_nearly_incompressible(scene)), unknowns(grid, displacement),
       active(grid, displacement == Nodes::gimp ? 4 : 2),
       // What is to rest under the explicit step must be in equilibrium without the projection.
-      form(UpForm<dim>::make(unknowns, method != Method::points_at_rest)),
+      form(UpForm<dim>::make(unknowns, method != Method::points_at_rest)), small_nodes(unknowns),
       boundary(unknowns, scene, parameters.surface_penalty),
       linear_solver(linear_parameters, "an implicit step"), now(start_time), book(carried)
 {}
@@ -87,29 +87,27 @@ void UpSolver<dim>::prepare()
       tracers.settle(scene.body(name), active);
     tracers.locate(active);
   }
-  std::vector<typename Space<dim>::Index> unused;
-  find_unused(unused);
-  boundary.locate(active, unused);
+  survey_nodes();
+  boundary.locate(active, small_nodes.unused());
   resize();
   project_start();
 }
 
 template <int dim>
-void UpSolver<dim>::find_unused(std::vector<typename Space<dim>::Index> &unused) const
+void UpSolver<dim>::survey_nodes()
 {
-  // Domains of material points that end on a face of cells reach nodes beyond it in name only.
-  if (unknowns.nodes() != Nodes::gimp)
+  if (method == Method::finite_elements)
     return;
   dealii::TrilinosWrappers::MPI::Vector mass(unknowns.owned()[0], grid.communicator());
   for (const auto &body : scene.bodies)
     form->sum_mass(*body, mass);
   mass.compress(dealii::VectorOperation::add);
-  const double largest = mass.linfty_norm();
   dealii::TrilinosWrappers::MPI::Vector all(unknowns.owned()[0], unknowns.relevant()[0], grid.communicator());
   all = mass;
-  for (const auto index : unknowns.relevant()[0])
-    if (all(index) <= 1e-14 * largest)
-      unused.push_back(index);
+  double speed = 0.;
+  for (const auto &body : scene.bodies)
+    speed = std::max(speed, std::sqrt(body->material().initial_modulus() / body->material().density()));
+  small_nodes.survey(all, speed);
 }
 
 template <int dim>
@@ -128,6 +126,13 @@ void UpSolver<dim>::resize()
       }
       boundary.constraints().add_entries_local_to_global(list, pattern, true);
     }
+  if (method != Method::finite_elements)
+    small_nodes.for_each_line([&](const auto &nodes) {
+      for (unsigned int d = 0; d < dim; ++d) {
+        list = {nodes[0] + d, nodes[1] + d, nodes[2] + d};
+        boundary.constraints().add_entries_local_to_global(list, pattern, true);
+      }
+    });
   dealii::IndexSet owned(unknowns.n_unknowns()), relevant(unknowns.n_unknowns());
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
     owned.add_indices(unknowns.owned()[b], b * unknowns.first_pressure());
@@ -147,10 +152,10 @@ void UpSolver<dim>::resize()
     state.moved.reinit(unknowns.owned()[0], unknowns.relevant()[0], communicator);
   }
 
-  for (BlockVector *vector : {&unknown, &correction, &residual, &right_side, &rate, &second, &total})
+  for (BlockVector *vector : {&unknown, &correction, &residual, &right_side, &rate, &second, &total, &change})
     vector->reinit(unknowns.owned(), communicator);
-  for (BlockVector *vector :
-       {&state.unknown, &state.rate_history, &state.second_history, &ghosted_total, &ghosted_rate})
+  for (BlockVector *vector : {&state.unknown, &state.rate_history, &state.second_history, &ghosted_total,
+                              &ghosted_rate, &ghosted_motion})
     vector->reinit(unknowns.owned(), unknowns.relevant(), communicator);
 }
 
@@ -241,7 +246,8 @@ void UpSolver<dim>::prepare_split()
 }
 
 template <int dim>
-void UpSolver<dim>::prepare_linear_solver(const TimeLevel &level, const bool coupled)
+void UpSolver<dim>::prepare_linear_solver(const TimeLevel &level, const bool coupled,
+                                          const bool changed_little)
 {
   PreconditionerData data;
   if (coupled && unknowns.has_pressure()) {
@@ -264,7 +270,8 @@ void UpSolver<dim>::prepare_linear_solver(const TimeLevel &level, const bool cou
     inertia *= bound * level.acceleration;
     data.inertia = &inertia;
   }
-  linear_solver.prepare(matrix, data);
+  linear_solver.prepare(matrix, data,
+                        changed_little ? LinearSolver::Reuse::preconditioner : LinearSolver::Reuse::pattern);
 }
 
 template <int dim>
@@ -317,15 +324,18 @@ void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
   for (const auto &body : scene.bodies)
     form->assemble(*body, level, state, loads, stabilisation, system);
   boundary.assemble(level, state, residual, with_matrix ? &matrix : nullptr);
+  small_nodes.assemble(level, state, boundary.constraints(), residual, with_matrix ? &matrix : nullptr);
   residual.compress(dealii::VectorOperation::add);
   right_side = residual;
   boundary.constraints().set_zero(right_side);
   if (!with_matrix)
     return;
   fill_empty_diagonal(level);
+  // Points move little in a step: a factorisation serves the matrices of many.
+  const bool changed_little = matrix_is_near && same(level, matrix_level);
   matrix_level = level;
-  matrix_is_valid = true;
-  prepare_linear_solver(level, level.velocity > 0.);
+  matrix_is_valid = matrix_is_near = true;
+  prepare_linear_solver(level, level.velocity > 0., changed_little);
 }
 
 template <int dim>
@@ -458,8 +468,8 @@ void UpSolver<dim>::project_start()
   residual.compress(dealii::VectorOperation::add);
   residual.block(0) = 0.;
   fill_empty_diagonal(level);
-  prepare_linear_solver(level, false);
-  matrix_is_valid = false;
+  prepare_linear_solver(level, false, false);
+  matrix_is_valid = matrix_is_near = false;
   correction = 0.;
   linear_solver.solve(correction, residual);
   second.block(1) = correction.block(1);
@@ -470,36 +480,24 @@ void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
 {
   share_unknown();
   ghosted_rate = rate;
-  dealii::Tensor<1, dim> weight;
-  double gravity_work = 0.;
-  add_weight(level, weight, gravity_work);
-  StepWork work;
+  bool all_finite = true;
   for (const auto &body : scene.bodies)
-    form->update_points(*body, level, state, ghosted_rate, volume_loads(level.time).gravity, moves, work);
-  StepWork of_followers;
+    form->update_points(*body, level, state, ghosted_rate, moves, all_finite);
   for (Scene<dim> *other : followers)
     for (const auto &body : other->bodies)
-      form->update_points(*body, level, state, ghosted_rate, volume_loads(level.time).gravity, false,
-                          of_followers);
+      form->update_points(*body, level, state, ghosted_rate, false, all_finite);
   const double dt = level.dt;
-  const auto held = boundary.reactions(level, residual, unknown);
-  const auto &loads = boundary.loads();
-  book.impulse += dt * (held.force + loads.force + weight);
-  book.gross_impulse += dt * (held.gross_force + loads.gross_force + weight.norm());
-  book.external_work += held.work + loads.work + gravity_work;
-  book.gravity_work += gravity_work;
-  book.fluid_outflow += dt * (held.outflow + loads.outflow);
-  book.fluid_squeezed += work.fluid_squeezed;
-  book.seepage_dissipation += work.seepage_dissipation;
-  book.seepage_work += work.seepage_work;
   total += unknown;
+  change += unknown;
   if (moved.size() > 0) {
     moved += unknown.block(0);
     state.moved = moved;
   }
-  if (unknowns.has_pressure())
+  if (unknowns.has_pressure()) {
+    change.block(1) -= second.block(1);
     second.block(1) = unknown.block(1);
-  int finite = work.finite;
+  }
+  int finite = all_finite;
   finite = dealii::Utilities::MPI::min(finite, grid.communicator());
   now += dt;
   nodal.time = now;
@@ -513,16 +511,6 @@ void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
     move_tracers();
   if (moves)
     relocate_points();
-}
-
-template <int dim>
-void UpSolver<dim>::add_weight(const TimeLevel &level, dealii::Tensor<1, dim> &weight, double &work) const
-{
-  const VolumeLoads<dim> loads = volume_loads(level.time);
-  if (loads.gravity.norm() == 0. && loads.forces.empty())
-    return;
-  for (const auto &body : scene.bodies)
-    form->sum_weight(*body, state, loads, level.time, weight, work);
 }
 
 template <int dim>
@@ -548,6 +536,14 @@ void UpSolver<dim>::move_tracers()
     scene.probes->locate(active);
     scene.probes->move(step, 1., false, active);
   }
+}
+
+template <int dim>
+bool UpSolver<dim>::reach_changes()
+{
+  const auto before = small_nodes.unused();
+  survey_nodes();
+  return dealii::Utilities::MPI::max(int(small_nodes.unused() != before), grid.communicator());
 }
 
 template <int dim>
@@ -583,6 +579,9 @@ void UpSolver<dim>::relocate_points()
     }
   }
   changed = dealii::Utilities::MPI::max(changed | leaves, grid.communicator());
+  // Domains may reach nodes now that they did not reach before.
+  if (!changed)
+    changed = reach_changes();
   if (changed)
     prepare();
   else

@@ -6,8 +6,9 @@
 
 #include <sstream>
 
-// The levels of time at which the equations hold: static, quasi-static (a diagonally implicit Runge-Kutta
-// method) and dynamic (generalised-alpha; theory.md, implicit steps).
+// The levels of time at which the equations hold: static, those of a diagonally implicit Runge-Kutta method
+// (quasi-static, and the dynamics of material points), and dynamic finite elements (generalised-alpha;
+// theory.md, implicit solvers).
 
 namespace peat {
 namespace {
@@ -30,6 +31,7 @@ void UpSolver<dim>::solve_static()
   unknown.block(0) = 0.;
   // One more iteration costs little, and rest is to be rest.
   solve(level, now, now, 1e-12);
+  book_work(level, 1., unknown.block(0));
   accept(level, false);
   first_step_done = false;
 }
@@ -42,8 +44,10 @@ void UpSolver<dim>::start(const Mode stage_mode)
   next_step = 0.;
   first_step_done = false;
   rate = 0.;
+  change = 0.;
+  change_scale = {};
   second.block(0) = 0.;
-  if (mode == Mode::quasi_static)
+  if (runge_kutta())
     return;
 
   // First v and then a and p_t from one matrix: that of the rates alone, [[M, 0], [-G, -S]].
@@ -78,7 +82,7 @@ void UpSolver<dim>::start(const Mode stage_mode)
   second.block(0) = correction.block(0);
   if (unknowns.has_pressure())
     rate.block(1) = correction.block(1);
-  matrix_is_valid = false;
+  matrix_is_valid = matrix_is_near = false;
 }
 
 template <int dim>
@@ -86,9 +90,9 @@ StableStep UpSolver<dim>::suggested_step() const
 {
   if (parameters.fixed_step > 0.)
     return {parameters.fixed_step, "'Time step'"};
-  if (mode == Mode::quasi_static && next_step > 0.)
+  if (runge_kutta() && next_step > 0.)
     return {next_step, "error of the step"};
-  if (mode == Mode::quasi_static && parameters.first_step > 0.)
+  if (runge_kutta() && parameters.first_step > 0.)
     return {parameters.first_step, "'First step'"};
   StableStep best{std::numeric_limits<double>::max(), ""};
   const double h = grid.smallest_cell_size();
@@ -114,8 +118,8 @@ StableStep UpSolver<dim>::suggested_step() const
 template <int dim>
 double UpSolver<dim>::step(const double latest)
 {
-  if (mode == Mode::quasi_static)
-    return quasi_static_step(latest);
+  if (runge_kutta())
+    return runge_kutta_step(latest);
   const double remaining = latest - now, wanted = suggested_step().dt;
   const double dt = remaining / std::ceil(remaining / wanted * (1. - 1e-12));
   dynamic_step(dt);
@@ -145,6 +149,7 @@ void UpSolver<dim>::damped_step(const double dt)
   unknown = second;
   unknown.block(0).equ(dt, rate.block(0));
   solve(level, now, now + dt, parameters.newton_tolerance);
+  book_work(level, 1., unknown.block(0));
 
   second.block(0).equ(-1. / dt, rate.block(0));
   rate.block(0).equ(1. / dt, unknown.block(0));
@@ -153,7 +158,7 @@ void UpSolver<dim>::damped_step(const double dt)
     rate.block(1).equ(1. / dt, unknown.block(1));
     rate.block(1).add(-1. / dt, second.block(1));
   }
-  accept(level, method == Method::material_points);
+  accept(level, false);
 }
 
 template <int dim>
@@ -185,6 +190,7 @@ void UpSolver<dim>::generalised_alpha_step(const double dt)
   unknown.block(0).equ(dt, rate.block(0));
   unknown.block(0).add(0.5 * dt * dt, second.block(0));
   solve(level, now, now + dt, parameters.newton_tolerance);
+  book_work(level, 1., unknown.block(0));
 
   first = rate;
   next.block(0) = second.block(0);
@@ -196,14 +202,15 @@ void UpSolver<dim>::generalised_alpha_step(const double dt)
     rate.block(1).equ(1. / (gamma_p * dt), unknown.block(1));
     rate.block(1).add(-1. / (gamma_p * dt), second.block(1), 1. - 1. / gamma_p, first.block(1));
   }
-  accept(level, method == Method::material_points);
+  accept(level, false);
 }
 
 template <int dim>
-double UpSolver<dim>::quasi_static_step(const double latest)
+double UpSolver<dim>::runge_kutta_step(const double latest)
 {
   constexpr unsigned int most_attempts = 30;
   double dt = std::min(suggested_step().dt, latest - now);
+  double error_before = std::numeric_limits<double>::infinity();
   for (unsigned int attempt = 0; attempt < most_attempts; ++attempt) {
     // A rest that is shorter than a tenth of a step is shared with this one.
     if (dt < latest - now && latest - now < 1.1 * dt)
@@ -211,22 +218,30 @@ double UpSolver<dim>::quasi_static_step(const double latest)
     const bool ends_there = dt >= (latest - now) * (1. - 1e-9);
     if (ends_there)
       dt = latest - now;
-    const double error = diagonally_implicit_step(dt);
-    // What loads do that jump is no error that shorter steps could reduce.
-    const bool free = parameters.fixed_step > 0. || !first_step_done;
+    const Ledger<dim> book_before = book;
+    const double error = try_stages(dt);
+    // What jumps is no error that shorter steps could reduce: loads at the start of a stage, and what points
+    // do that come to other nodes or surfaces that cut other cells.
+    constexpr double reduced = 0.7;
+    const bool jumps = std::isfinite(error) && (!first_step_done || error > reduced * error_before);
+    error_before = error;
+    const bool free = parameters.fixed_step > 0. || jumps;
     if (free || error <= parameters.step_tolerance) {
       const double growth = std::min(parameters.largest_growth,
                                      0.8 * std::sqrt(parameters.step_tolerance / std::max(error, 1e-300)));
       const double before = std::max(dt, ends_there ? next_step : 0.);
       next_step = parameters.fixed_step > 0. ? parameters.fixed_step
-                  : !first_step_done         ? dt
+                  : jumps                    ? dt
                                              : std::max(dt * growth, ends_there && growth > 1. ? before : 0.);
+      // A step that hardly grows stays, and with it its factorisation.
+      constexpr double hardly = 1.3;
+      if (next_step > dt && next_step < hardly * dt && !ends_there)
+        next_step = dt;
       first_step_done = true;
-      TimeLevel level = this->level(now + dt, dt);
-      level.velocity = level.pressure_rate = 1. / (stage_share * dt);
-      accept(level, method == Method::material_points);
+      accept(stage_level(dt, true), method == Method::material_points);
       return dt;
     }
+    book = book_before;
     ++done.rejected_steps;
     dt *= std::max(0.2, 0.8 * std::sqrt(parameters.step_tolerance / error));
   }
@@ -237,26 +252,82 @@ double UpSolver<dim>::quasi_static_step(const double latest)
 }
 
 template <int dim>
-double UpSolver<dim>::diagonally_implicit_step(const double dt)
+dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const
+{
+  dealii::TrilinosWrappers::MPI::Vector velocity(unknowns.owned()[0], grid.communicator()), mass(velocity);
+  for (const auto &body : scene.bodies) {
+    form->add_momentum(*body, velocity);
+    form->sum_mass(*body, mass);
+  }
+  velocity.compress(dealii::VectorOperation::add);
+  mass.compress(dealii::VectorOperation::add);
+  for (const auto index : unknowns.owned()[0])
+    if (mass(index) > 0.)
+      velocity(index) /= mass(index);
+  velocity.compress(dealii::VectorOperation::insert);
+  boundary.constraints().set_zero(velocity);
+  return velocity;
+}
+
+template <int dim>
+TimeLevel UpSolver<dim>::stage_level(const double dt, const bool last) const
 {
   const double g = stage_share;
-  TimeLevel level = this->level(now + g * dt, dt);
+  TimeLevel level = this->level(now + (last ? dt : g * dt), dt);
   level.velocity = level.pressure_rate = 1. / (g * dt);
+  if (mode == Mode::dynamic) {
+    level.acceleration = 1. / (g * dt * g * dt);
+    level.old_velocity = (last ? (1. - 2. * g) / g : -1.) / (g * dt);
+  }
+  return level;
+}
+
+template <int dim>
+double UpSolver<dim>::try_stages(const double dt)
+{
+  // Where Newton's iterations fail a shorter step may do.
+  if (parameters.fixed_step > 0.)
+    return find_stages(dt);
+  try {
+    return find_stages(dt);
+  } catch (const NumericalError &) {
+    matrix_is_valid = false;
+    return std::numeric_limits<double>::infinity();
+  }
+}
+
+template <int dim>
+double UpSolver<dim>::find_stages(const double dt)
+{
+  const double g = stage_share;
   state.rate_history = 0.;
   BlockVector old = second;
   old.block(0) = 0.;
   state.second_history = old;
   unknown = old;
+  if (mode == Mode::dynamic && !linear)
+    unknown.block(0).equ(g * dt, mean_velocity());
+  TimeLevel level = stage_level(dt, false);
   solve(level, now, now + g * dt, parameters.newton_tolerance);
 
-  // k_1 = (Y_1 - y_n)/(g dt);  k_2 = (Y_2 - y_n)/(g dt) - (1 - g)/g k_1
+  // k_1 = (Y_1 - y_n)/(g dt);  k_2 = (Y_2 - y_n)/(g dt) - (1 - g)/g k_1, of u and p, and of v, where v_2 is
+  // that k_2: a_2 = Y_2/(g dt)^2 - 2 (1 - g)/(g^2 dt) k_1 + (1 - 2 g)/(g^2 dt) v_n
   BlockVector first = unknown;
   first -= old;
   first *= 1. / (g * dt);
+  // Stages count by their weights in the step, 1 - g and g.
+  BlockVector motion = first;
+  motion *= dt;
+  book_work(level, 1. - g, motion.block(0));
   BlockVector history = first;
   history *= -(1. - g) / g;
   state.rate_history = history;
-  level.time = now + dt;
+  if (mode == Mode::dynamic) {
+    BlockVector accelerations = old;
+    accelerations.block(0).equ(-2. * (1. - g) / (g * g * dt), first.block(0));
+    state.second_history = accelerations;
+  }
+  level = stage_level(dt, true);
   solve(level, now, now + dt, parameters.newton_tolerance);
 
   // Against the first-order y_n + dt k_1.
@@ -266,21 +337,76 @@ double UpSolver<dim>::diagonally_implicit_step(const double dt)
     rate.block(b).equ(1. / (g * dt), difference.block(b));
     rate.block(b).add(1., history.block(b));
   }
+  motion.equ(dt, rate);
+  book_work(level, g, motion.block(0));
   difference.add(-dt, first);
-  BlockVector moved = total;
-  moved += unknown;
-  displacement_scale = std::max(displacement_scale, moved.block(0).linfty_norm());
-  const auto relative = [&](const unsigned int block, const double scale) {
-    return scale > 0.
-               ? difference.block(block).l2_norm() / std::sqrt(double(difference.block(block).size())) / scale
-               : 0.;
-  };
-  double error = relative(0, displacement_scale);
-  if (unknowns.has_pressure()) {
-    pressure_scale = std::max(pressure_scale, unknown.block(1).linfty_norm());
-    error = std::max(error, relative(1, pressure_scale));
+  return estimated_error(difference);
+}
+
+template <int dim>
+std::array<double, 2> UpSolver<dim>::mean_at_points(const BlockVector &field)
+{
+  ghosted_motion = field;
+  std::array<double, 2> squares{}, volumes{};
+  for (const auto &body : scene.bodies)
+    form->add_squares(*body, ghosted_motion, squares, volumes);
+  for (unsigned int b = 0; b < 2; ++b) {
+    squares[b] = dealii::Utilities::MPI::sum(squares[b], grid.communicator());
+    volumes[b] = dealii::Utilities::MPI::sum(volumes[b], grid.communicator());
+    squares[b] = volumes[b] > 0. ? std::sqrt(squares[b] / volumes[b]) : 0.;
+  }
+  return squares;
+}
+
+template <int dim>
+double UpSolver<dim>::estimated_error(const BlockVector &difference)
+{
+  BlockVector changed = change;
+  changed += unknown;
+  if (unknowns.has_pressure())
+    changed.block(1) -= second.block(1);
+  // Changes that are nothing beside a cell or the pressures need no accuracy.
+  const std::array<double, 2> least = {1e-6 * grid.smallest_cell_size(), 1e-3 * mean_at_points(unknown)[1]};
+  // At points: what nodes have that points do not see is no error.
+  const auto changes = mean_at_points(changed), errors = mean_at_points(difference);
+  double error = 0.;
+  for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
+    change_scale[b] = std::max({change_scale[b], 2. * changes[b], least[b]});
+    error = std::max(error, change_scale[b] > 0. ? errors[b] / change_scale[b] : 0.);
+  }
+  // Points must not pass a cell.
+  if (method == Method::material_points) {
+    const double farthest = unknown.block(0).linfty_norm() / (0.5 * grid.smallest_cell_size());
+    error = std::max(error, parameters.step_tolerance * farthest * farthest);
   }
   return error;
+}
+
+template <int dim>
+void UpSolver<dim>::book_work(const TimeLevel &level, const double share,
+                              const dealii::TrilinosWrappers::MPI::Vector &motion)
+{
+  ghosted_motion.block(0) = motion;
+  const VolumeLoads<dim> volume = volume_loads(level.time);
+  dealii::Tensor<1, dim> weight;
+  double gravity_work = 0.;
+  StepWork work;
+  for (const auto &body : scene.bodies) {
+    if (volume.gravity.norm() > 0. || !volume.forces.empty())
+      form->sum_weight(*body, ghosted_motion.block(0), volume, level.time, weight, gravity_work);
+    form->book_seepage(*body, level, state, volume.gravity, work);
+  }
+  const auto held = boundary.reactions(level, residual, motion);
+  const auto loads = boundary.loads(level, ghosted_motion.block(0));
+  const double dt = share * level.dt;
+  book.impulse += dt * (held.force + loads.force + weight);
+  book.gross_impulse += dt * (held.gross_force + loads.gross_force + weight.norm());
+  book.external_work += share * (held.work + loads.work + gravity_work);
+  book.gravity_work += share * gravity_work;
+  book.fluid_outflow += dt * (held.outflow + loads.outflow);
+  book.fluid_squeezed += share * work.fluid_squeezed;
+  book.seepage_dissipation += share * work.seepage_dissipation;
+  book.seepage_work += share * work.seepage_work;
 }
 
 namespace {
@@ -334,8 +460,15 @@ void UpSolver<dim>::reset_displacements()
   template void UpSolver<dim>::dynamic_step(double);                                                         \
   template void UpSolver<dim>::damped_step(double);                                                          \
   template void UpSolver<dim>::generalised_alpha_step(double);                                               \
-  template double UpSolver<dim>::quasi_static_step(double);                                                  \
-  template double UpSolver<dim>::diagonally_implicit_step(double);
+  template double UpSolver<dim>::runge_kutta_step(double);                                                   \
+  template double UpSolver<dim>::try_stages(double);                                                         \
+  template double UpSolver<dim>::find_stages(double);                                                        \
+  template std::array<double, 2> UpSolver<dim>::mean_at_points(const BlockVector &);                         \
+  template void UpSolver<dim>::book_work(const TimeLevel &, double,                                          \
+                                         const dealii::TrilinosWrappers::MPI::Vector &);                     \
+  template double UpSolver<dim>::estimated_error(const BlockVector &);                                       \
+  template dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const;                       \
+  template TimeLevel UpSolver<dim>::stage_level(double, bool) const;
 PEAT_INSTANTIATE(2)
 PEAT_INSTANTIATE(3)
 #undef PEAT_INSTANTIATE

@@ -25,7 +25,8 @@ enum class Method { mpm, fem };
 /// One subsection of `Stages`: a part of the run with its own duration.
 struct StageParameters
 {
-  explicit StageParameters(Section section);
+  /// `common`: the scheme of stages that do not name one.
+  StageParameters(Section section, Scheme common);
 
   enum class Solver { dynamic, quasi_static, static_state };
 
@@ -36,6 +37,7 @@ struct StageParameters
   bool static_on_points = true; ///< of material points: else on the finite element mesh
   double K0 = 0.;               ///< static: horizontal over vertical effective stress; 0: from elasticity
   double local_damping = 0.;
+  Scheme scheme; ///< dynamic stages of material points
 };
 
 /// The entry `Dimension`, which decides what all others mean.
@@ -51,8 +53,12 @@ struct Case
   const Material &material(const std::string &name) const;
   bool is_saturated() const;
   double end_time() const;
-  /// Whether any stage is solved implicitly.
+  /// Whether any stage is, or may turn out to be, solved implicitly.
   bool is_implicit() const;
+  /// Why a scheme does not apply to a dynamic stage; "" if it does.
+  std::string why_not(Scheme scheme, const StageParameters &stage) const;
+  /// Whether a dynamic stage of material points has, or may choose, the scheme.
+  bool may_have(Scheme scheme) const;
   /// What the points store for the method.
   SchemeFields fields() const;
   /// What Gauss points of the finite element method store.
@@ -70,6 +76,7 @@ struct Case
   std::vector<std::unique_ptr<Condition<dim>>> conditions;
   Function gravity;
   Method method;
+  Scheme common_scheme; ///< of stages that name none
   SchemeParameters scheme;
   ImplicitParameters implicit;
   LinearSolverParameters linear;
@@ -87,6 +94,8 @@ private:
   void check(const Section &root) const;
   void check_contacts() const;
   void set_fall_velocities();
-  void check_implicit_pressure(const Section &root) const;
+  void check_schemes(const Section &root) const;
+  std::string why_not_semi_implicit() const;
+  std::string why_not_implicit(const StageParameters &stage) const;
 };
 } // namespace peat

@@ -20,7 +20,9 @@ struct CompareParameters
   explicit CompareParameters(Section section);
 
   Section section;
-  unsigned int n_samples = 20; ///< number of equally spaced times
+  unsigned int n_samples = 20; ///< number of times
+  bool logarithmic = false;    ///< times are spaced by equal factors, else equally
+  double first_sample = 0.;    ///< [s] of times spaced by factors; 0: a ten-thousandth of the run
   double tolerance = 0.02;     ///< of relative differences; those above get a sentence
   /// What the two runs set, as `--set` would: "Section/Key=value", several separated by ';'.
   std::string first = "Method=mpm";
@@ -79,7 +81,8 @@ private:
   Recording data;
 };
 
-/// Equally spaced times in (0, end], n of them, and the `others`; ascending, each once (up to 1e-9 of the
-/// end).
-std::vector<double> sample_times(unsigned int n, double end, const std::vector<double> &others);
+/// Times in (0, end] as the parameters space them, and the `others`; ascending, each once (up to 1e-9 of the
+/// end). Throws an InputError if the first one is after the end.
+std::vector<double> sample_times(const CompareParameters &compare, double end,
+                                 const std::vector<double> &others);
 } // namespace peat

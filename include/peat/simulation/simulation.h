@@ -8,6 +8,7 @@
 #include <peat/simulation/recorder.h>
 #include <peat/simulation/run_options.h>
 #include <peat/simulation/schedule.h>
+#include <peat/simulation/scheme_choice.h>
 #include <peat/simulation/statistics.h>
 #include <peat/solver/explicit_mpm.h>
 #include <peat/solver/totals.h>
@@ -64,11 +65,14 @@ public:
 private:
   struct Outputs;
   void run_stage(const StageParameters &stage, double start);
-  void run_explicit_stage(const StageParameters &stage, double start);
+  void run_explicit_stage(const StageParameters &stage, double start, const SchemeEstimate &estimate);
   void run_implicit_stage(const StageParameters &stage, double start);
   void run_static_stage(const StageParameters &stage, double start);
   void bring_in_bodies(const StageParameters &stage);
   void begin_stage(const StageParameters &stage, const StableStep &step);
+  /// The scheme of a dynamic stage of material points, and what the log says of it. Collective.
+  SchemeEstimate choose_scheme(const StageParameters &stage, double start);
+  void note_scheme(Scheme scheme);
   void make_up_solver(typename UpSolver<dim>::Method method, double start);
   unsigned long unknowns_of_solver() const;
   void report_work() const;
@@ -96,7 +100,8 @@ private:
   std::unique_ptr<Balances<dim>> balances;
   std::unique_ptr<Outputs> outputs;
   StepRecord steps;
-  PressureWork pressure_work; ///< of explicit stages with implicit pressures
+  PressureWork pressure_work;       ///< of semi-implicit stages
+  std::vector<std::string> schemes; ///< names of those used so far
   double now = 0.;
   double planned_end = 0.;
   bool stopped = false;

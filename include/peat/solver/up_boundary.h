@@ -43,14 +43,15 @@ public:
   /// What was prescribed holds against: sums over this rank's prescribed unknowns of the residual there.
   struct Reactions
   {
-    double work = 0.;             ///< on the motion U [J]
+    double work = 0.;             ///< on a motion [J]
     dealii::Tensor<1, dim> force; ///< [N]
     double gross_force = 0.;      ///< [N]
     double outflow = 0.;          ///< [m^dim/s]
   };
-  Reactions reactions(const TimeLevel &level, const BlockVector &residual, const BlockVector &unknown) const;
-  /// The same of the surface forces and fluxes of the last assemble().
-  const Reactions &loads() const { return acting; }
+  Reactions reactions(const TimeLevel &level, const BlockVector &residual,
+                      const dealii::TrilinosWrappers::MPI::Vector &motion) const;
+  /// The same of the surface forces and fluxes of the last assemble(); `motion` with ghosts.
+  Reactions loads(const TimeLevel &level, const dealii::TrilinosWrappers::MPI::Vector &motion) const;
 
 private:
   using Index = typename Space<dim>::Index;
@@ -88,7 +89,10 @@ private:
   bool is_covered(const Piece &piece) const;
   void prescribe_face(const Piece &piece, unsigned int axis);
   void share_pressures();
-  void add_surface_forces(const TimeLevel &level, const StepState &state, BlockVector &residual);
+  /// Calls an action with each piece of surface that a force acts on, and the force [N].
+  template <typename Action>
+  void for_each_force(double time, const Action &action) const;
+  void add_surface_forces(const TimeLevel &level, BlockVector &residual);
   void add_fluxes(const TimeLevel &level, BlockVector &residual);
   void add_penalties(const TimeLevel &level, const StepState &state, BlockVector &residual,
                      BlockMatrix *matrix);

@@ -18,14 +18,15 @@ using BlockVector = dealii::TrilinosWrappers::MPI::BlockVector;
 /// the unknowns U (displacement since t_n) and P (pressure at the end of the step)
 ///   u - u_n = share U,                     p   = (1 - share) p_n + share P,
 ///   v = velocity U + v_history,            p_t = pressure_rate (P - p_n) + rate_history,
-///   a = acceleration U + a_history.
-/// All rates zero: a static state.
+///   a = acceleration U + a_history + old_velocity v_p,
+/// where v_p are the velocities of the points at t_n. All rates zero: a static state.
 struct TimeLevel
 {
   double time = 0.; ///< of the loads [s]
   double share = 1.;
   double velocity = 0.;      ///< [1/s]
   double acceleration = 0.;  ///< [1/s^2]
+  double old_velocity = 0.;  ///< [1/s]; not 0 where velocities live on points
   double pressure_rate = 0.; ///< [1/s]
   double dt = 0.;            ///< [s]
   bool seepage_inertia = true;
@@ -51,7 +52,6 @@ struct StepWork
   double seepage_dissipation = 0.; ///< [J]
   double seepage_work = 0.;        ///< [J], see Ledger
   double fluid_squeezed = 0.;      ///< [m^dim]
-  bool finite = true;
 };
 
 /// What the residual's terms would sum up to if none cancelled another: the scale of round-off. By block, of
@@ -121,10 +121,12 @@ public:
 
   /// Take the step: stress, state, pressure, displacement and velocity of the points from the unknowns and
   /// the velocity at its end (in `end_velocity`); volumes and porosities under finite strain; with `move`,
-  /// also positions and extents.
+  /// also positions and extents. `finite` becomes false if a number is not.
   virtual void update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
-                             const BlockVector &end_velocity, const dealii::Tensor<1, dim> &gravity,
-                             bool move, StepWork &work) = 0;
+                             const BlockVector &end_velocity, bool move, bool &finite) = 0;
+  /// Book what flow takes from the points in a step at the rates of a level.
+  virtual void book_seepage(const Body<dim> &body, const TimeLevel &level, const StepState &state,
+                            const dealii::Tensor<1, dim> &gravity, StepWork &work) = 0;
 
   /// Add sum m N_i v of the points.
   virtual void add_momentum(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &momentum) = 0;
@@ -132,8 +134,13 @@ public:
   virtual void sum_mass(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &mass) = 0;
   /// Add sum m N_i^2, the diagonal of the mass matrix.
   virtual void sum_inertia(const Body<dim> &body, dealii::TrilinosWrappers::MPI::Vector &inertia) = 0;
-  /// Sum of the points' weights and other body forces, and their work on U.
-  virtual void sum_weight(const Body<dim> &body, const StepState &state, const VolumeLoads<dim> &loads,
-                          double time, dealii::Tensor<1, dim> &weight, double &work) = 0;
+  /// Add volume integrals over the points: of the squares of a displacement and of a pressure field (with
+  /// ghosts), and of 1 for each of them.
+  virtual void add_squares(const Body<dim> &body, const BlockVector &field, std::array<double, 2> &squares,
+                           std::array<double, 2> &volumes) = 0;
+  /// Sum of the points' weights and other body forces, and their work on a motion (with ghosts) [m].
+  virtual void sum_weight(const Body<dim> &body, const dealii::TrilinosWrappers::MPI::Vector &motion,
+                          const VolumeLoads<dim> &loads, double time, dealii::Tensor<1, dim> &weight,
+                          double &work) = 0;
 };
 } // namespace peat

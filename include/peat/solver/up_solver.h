@@ -3,6 +3,7 @@
 #include <peat/solver/implicit_parameters.h>
 #include <peat/solver/linear_solver.h>
 #include <peat/solver/scene.h>
+#include <peat/solver/small_nodes.h>
 #include <peat/solver/solver.h>
 #include <peat/solver/time_step.h>
 #include <peat/solver/up_boundary.h>
@@ -18,7 +19,8 @@ namespace peat {
 /// move.
 ///
 /// A step is: level of time, Newton's iterations, new rates, points. Points carry stress, history and
-/// pressure; velocities, accelerations and the rates of pressures live on nodes.
+/// pressure. Velocities, accelerations and the rates of pressures live on nodes; velocities of material
+/// points live on the points.
 template <int dim>
 class UpSolver : public Solver<dim>
 {
@@ -26,7 +28,7 @@ public:
   /// How the scene's points are used.
   enum class Method {
     finite_elements, ///< Gauss points, which stay where they are
-    material_points, ///< material points with the basis of the explicit method; quasi-static and static only
+    material_points, ///< material points with the basis of the explicit method
     points_at_rest   ///< the same for the skeleton alone, under the pressures that the points have, which act
                      ///< as in the explicit step: what is in equilibrium here is at rest there
   };
@@ -45,9 +47,9 @@ public:
   void start(Mode mode);
   /// Step that the solver would take next, and why.
   StableStep suggested_step() const;
-  /// Advance by one step, not beyond `latest`; a quasi-static step may turn out shorter than suggested.
-  /// Returns its length. Throws NumericalError on every rank if it does not converge or a number is not
-  /// finite.
+  /// Advance by one step, not beyond `latest`; a step whose length follows from its error may turn out
+  /// shorter than suggested. Returns its length. Throws NumericalError on every rank if it does not converge
+  /// or a number is not finite.
   double step(double latest);
 
   /// The state of equilibrium and of steady seepage under the loads at the present time. Points take it, time
@@ -82,16 +84,29 @@ public:
 
 private:
   void resize();
-  void find_unused(std::vector<typename Space<dim>::Index> &unused) const;
+  /// Find nodes with little or no mass. Collective.
+  void survey_nodes();
+  /// Whether points reach other nodes than before, which have no equations yet. Collective.
+  bool reach_changes();
   void project_start();
   VolumeLoads<dim> volume_loads(double time) const;
 
   void dynamic_step(double dt);
   void damped_step(double dt);
   void generalised_alpha_step(double dt);
-  double quasi_static_step(double latest);
-  /// Both stages of a step; returns the estimated error.
-  double diagonally_implicit_step(double dt);
+  /// Whether steps are those of the diagonally implicit method, with lengths that follow from their errors.
+  bool runge_kutta() const { return mode == Mode::quasi_static || method == Method::material_points; }
+  double runge_kutta_step(double latest);
+  /// Both stages of a step; returns the estimated error over the largest changes so far.
+  double find_stages(double dt);
+  /// The same; infinite if the equations were not solved, unless the user has fixed the step.
+  double try_stages(double dt);
+  /// Of the points around a node, weighted by mass and shape function; 0 where conditions prescribe.
+  dealii::TrilinosWrappers::MPI::Vector mean_velocity() const;
+  double estimated_error(const BlockVector &difference);
+  /// Roots of the mean squares of displacement [m] and pressure [Pa] at the points.
+  std::array<double, 2> mean_at_points(const BlockVector &field);
+  TimeLevel stage_level(double dt, bool last) const;
 
   /// Find the unknowns at the end of [start, end] that satisfy the equations at a level.
   void solve(const TimeLevel &level, double start, double end, double tolerance);
@@ -106,11 +121,13 @@ private:
   void describe_unknowns();
   /// Room for the volumetric split, where the linear solver has a use for it.
   void prepare_split();
-  void prepare_linear_solver(const TimeLevel &level, bool coupled);
+  void prepare_linear_solver(const TimeLevel &level, bool coupled, bool changed_little);
   void share_unknown();
-  /// After the unknowns have been found: points, tracers, balances.
+  /// After the unknowns have been found: points and tracers.
   void accept(const TimeLevel &level, bool moves);
-  void add_weight(const TimeLevel &level, dealii::Tensor<1, dim> &weight, double &work) const;
+  /// Book a share of a step, after the unknowns of a level have been found: forces at this level on the
+  /// motion with its velocity in the length of the step, and flow at its rates.
+  void book_work(const TimeLevel &level, double share, const dealii::TrilinosWrappers::MPI::Vector &motion);
   void move_tracers();
   void relocate_points();
   TimeLevel level(double time, double dt) const;
@@ -126,6 +143,7 @@ private:
   Space<dim> unknowns;
   ActiveNodes<dim> active;
   std::unique_ptr<UpForm<dim>> form;
+  SmallNodes<dim> small_nodes;
   UpBoundary<dim> boundary;
   LinearSolver linear_solver;
   BlockMatrix matrix;
@@ -133,23 +151,25 @@ private:
   std::unique_ptr<VolumetricSplit> split;
   dealii::TrilinosWrappers::MPI::Vector inertia, mass_diagonal;
   bool matrix_is_valid = false;
+  bool matrix_is_near = false; ///< to the one of `matrix_level` that the linear solver saw last
   TimeLevel matrix_level;
 
   BlockVector unknown, correction, residual, right_side; ///< this rank's
   BlockVector rate;                                      ///< v [m/s] and p_t [Pa/s] at the start of the step
   BlockVector second;                                    ///< a [m/s^2] and p [Pa]
   BlockVector total;                                     ///< displacement since the last reset [m]
+  BlockVector change; ///< of displacement and pressure in this stage, since the last numbering
   dealii::TrilinosWrappers::MPI::Vector
       moved; ///< the same since the start; of finite elements, finite strain
-  BlockVector ghosted_total, ghosted_rate;
+  BlockVector ghosted_total, ghosted_rate, ghosted_motion;
   StepState state;
 
   double now;
   Mode mode = Mode::dynamic;
   unsigned int damped_steps_left = 0;
-  double next_step = 0.; ///< quasi-static [s]
+  double next_step = 0.; ///< Runge-Kutta [s]; 0: none yet
   bool first_step_done = false;
-  double pressure_scale = 0., displacement_scale = 0.;
+  std::array<double, 2> change_scale{};   ///< largest changes so far [m], [Pa]
   std::array<double, 2> residual_scale{}; ///< largest residuals so far: momentum [N], fluid [m^dim/s]
   double fluid_scale_before = 1.;
   GrossResidual gross{};
