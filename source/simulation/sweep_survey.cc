@@ -1,5 +1,6 @@
 #include <peat/base/invalid_value.h>
 #include <peat/base/text.h>
+#include <peat/simulation/scheme_choice.h>
 #include <peat/simulation/simulation.h>
 #include <peat/simulation/sweep_plan.h>
 
@@ -15,7 +16,6 @@ constexpr std::size_t most_runs = 10000;
 // Rough costs on one core, only good to put runs in order and to begin with a time to go.
 constexpr double seconds_a_step = 2e-5;
 constexpr double seconds_a_point_and_step = 3e-7;
-constexpr double pressure_solve_factor = 4.;
 constexpr double seconds_an_unknown_and_solve = 1e-5;
 constexpr double quasi_static_steps = 100.;
 constexpr double lines_a_stage = 200.;
@@ -30,7 +30,7 @@ template <int dim>
 std::string without_meaning(const Case<dim> &parameters, const std::string &key)
 {
   const bool fem = parameters.method == Method::fem;
-  if (fem && begins_with(key, "Explicit MPM/"))
+  if (fem && (begins_with(key, "Explicit MPM/") || SweepAxis(key, "1").name() == "Scheme"))
     return "finite elements do not use " + in_quotes(key);
   if (fem && begins_with(key, "Bodies/") && SweepAxis(key, "1").name() == "Points per cell")
     return "finite elements have no " + in_quotes(key);
@@ -40,18 +40,21 @@ std::string without_meaning(const Case<dim> &parameters, const std::string &key)
   return "";
 }
 
-/// Rough seconds of a stage of material points that is solved explicitly.
+/// Rough seconds of a dynamic stage of material points.
 template <int dim>
-double explicit_seconds(const Case<dim> &parameters, const StageParameters &stage, const Scene<dim> &scene,
-                        const StableStep &stable)
+double dynamic_seconds(const Case<dim> &parameters, const StageParameters &stage, const Grid<dim> &grid,
+                       const Scene<dim> &scene, const double start)
 {
-  const SchemeParameters &scheme = parameters.scheme;
-  const double dt = scheme.fixed_step > 0. ? scheme.fixed_step : scheme.step_factor * stable.dt;
+  const auto estimates =
+      estimate_schemes(parameters, stage, scene, grid, demand(parameters, stage, scene, grid, start));
+  auto used = estimates.begin();
+  if (stage.scheme != Scheme::automatic)
+    used = std::find_if(estimates.begin(), estimates.end(),
+                        [&](const SchemeEstimate &estimate) { return estimate.scheme == stage.scheme; });
   const double interval = parameters.output.statistics_interval;
   const double n_lines = interval > 0. ? stage.duration / interval : lines_a_stage;
-  const double factor = scheme.implicit_pressure ? pressure_solve_factor : 1.;
-  return std::max(stage.duration / dt, n_lines) *
-         (seconds_a_step + factor * seconds_a_point_and_step * scene.n_global_points());
+  return std::max(used->cost, n_lines) *
+         (seconds_a_step + seconds_a_point_and_step * scene.n_global_points());
 }
 
 /// Rough seconds of a run; the scene is that of its start.
@@ -62,7 +65,6 @@ double nominal_seconds(const Case<dim> &parameters, const Grid<dim> &grid, Scene
   double seconds = 0.;
   const bool fem = parameters.method == Method::fem;
   std::unique_ptr<UpSolver<dim>> up;
-  std::optional<StableStep> stable;
   double n_unknowns = double(grid.triangulation().n_global_active_cells()) * (dim + 1);
   if (fem) {
     up = std::make_unique<UpSolver<dim>>(
@@ -71,6 +73,7 @@ double nominal_seconds(const Case<dim> &parameters, const Grid<dim> &grid, Scene
     up->prepare();
     n_unknowns = up->space().n_unknowns();
   }
+  double start = 0.;
   for (const StageParameters &stage : parameters.stages) {
     double n_solves = 1.;
     if (stage.solver == Solver::quasi_static)
@@ -79,15 +82,11 @@ double nominal_seconds(const Case<dim> &parameters, const Grid<dim> &grid, Scene
       up->start(UpSolver<dim>::Mode::dynamic);
       n_solves = stage.duration / up->suggested_step().dt;
     }
-    if (stage.solver == Solver::dynamic && !fem) {
-      if (!stable) {
-        ExplicitMPM<dim> solver(parameters.scheme, grid, scene, 0.);
-        solver.prepare();
-        stable = solver.stable_step();
-      }
-      seconds += explicit_seconds(parameters, stage, scene, *stable);
-    } else
+    if (stage.solver == Solver::dynamic && !fem)
+      seconds += dynamic_seconds(parameters, stage, grid, scene, start);
+    else
       seconds += n_solves * n_unknowns * seconds_an_unknown_and_solve;
+    start += stage.duration;
   }
   return seconds;
 }
