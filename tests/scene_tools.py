@@ -269,6 +269,9 @@ def compare_tables(a, b):
     # The momentum of bodies that move against each other is a difference.
     if "mass [kg]" in names:
         scale["[N s]"] = max(scale["[N s]"], scale["[kg]"] * scale["[m/s]"])
+    # And a moment about the centre of a body that is hit in the middle is nothing but round-off.
+    if "[N m]" in scale and "[N]" in scale and "[m]" in scale:
+        scale["[N m]"] = max(scale["[N m]"], scale["[N]"] * scale["[m]"])
     for name in names:
         for p, q in zip(rows_a, rows_b):
             if (p[name] in ABSENT) != (q[name] in ABSENT):

@@ -52,7 +52,7 @@ bool SeparatingPlanes<dim>::improve()
   // Keeps the planes of separable points finite: the smaller, the steeper they are and the fewer points
   // decide.
   constexpr double penalty = 1e-4;
-  constexpr double still = 1e-8;
+  constexpr double still = 1e-11;
   using Matrix = Eigen::Matrix<double, n_unknowns, n_unknowns>;
   using Vector = Eigen::Matrix<double, n_unknowns, 1>;
   bool converged = true;

@@ -100,22 +100,28 @@ void ContactPair<dim>::find_lines(const ActiveNodes<dim> &nodes, std::uint32_t C
     site.acts = areas[s] >= (1. - slack) * std::max(area(site.line[1]), area(site.line[2]));
   }
   for (ContactSite<dim> &site : sites)
-    if (site.acts && site.line[1] != no_index && sites[site.line[1]].acts)
-      site.acts = false;
+    site.shares_line = site.acts && site.line[1] != no_index && sites[site.line[1]].acts;
+  for (ContactSite<dim> &site : sites)
+    site.acts = site.acts && !site.shares_line;
 
   // Where lines along different axes meet, a node belongs to the site at it, else to that whose share is
-  // larger.
-  constexpr std::uint32_t nobody = no_index;
-  owner_of_site.assign(sites.size(), nobody);
+  // larger; of equal ones to the one that comes first in space, on whatever rank.
+  owner_of_site.assign(sites.size(), no_index);
   for (std::uint32_t s = 0; s < sites.size(); ++s)
     if (sites[s].acts)
       owner_of_site[s] = s;
+  const auto comes_before = [&](const std::uint32_t a, const std::uint32_t b) {
+    if (std::abs(areas[a] - areas[b]) > slack * areas[b])
+      return areas[a] > areas[b];
+    return grid.node_lattice(nodes.grid_node(sites[a].*node)) <
+           grid.node_lattice(nodes.grid_node(sites[b].*node));
+  };
   for (std::uint32_t s = 0; s < sites.size(); ++s)
     if (sites[s].acts)
       for (const unsigned int k : {1u, 2u})
         if (const std::uint32_t other = sites[s].line[k]; other != no_index && !sites[other].acts) {
           std::uint32_t &owner = owner_of_site[other];
-          if (owner == nobody || areas[s] > areas[owner])
+          if (owner == no_index || comes_before(s, owner))
             owner = s;
         }
   for (std::uint32_t s = 0; s < sites.size(); ++s)

@@ -23,6 +23,7 @@ struct ContactSite
   std::uint32_t second = no_index; ///< the same node, of the second continuum
   bool counts = false;             ///< this rank handles it
   bool acts = false;               ///< the interface is here
+  bool shares_line = false;        ///< a neighbour on its line carries as much
   /// Places of the sites whose nodes move with this one's surface; itself first, no_index where there is
   /// none.
   std::array<std::uint32_t, 3> line;
