@@ -180,13 +180,20 @@ void BodyContact<dim>::find_surfaces()
         g[side] += volume_gradient[side][s * dim + d] * sites[s].normal[d];
     areas[0][s] = std::max(0., g[0]);
     areas[1][s] = std::max(0., -g[1]);
-    both_areas[s] = areas[0][s] + areas[1][s];
+    both_areas[s] = has_mass(sites[s]) ? areas[0][s] + areas[1][s] : 0.;
   }
   this->find_lines(first.nodes(), &ContactSite<dim>::first, site_of_node, both_areas);
   for (ContactSite<dim> &site : sites)
     if (site.acts) {
-      site.area = std::min(this->weigh(site, &ContactSite<dim>::first, areas[0], site.first_surface),
-                           this->weigh(site, &ContactSite<dim>::second, areas[1], site.second_surface));
+      // The same weights in both bodies, so that equal and opposite impulses act at one place.
+      this->weigh(site, &ContactSite<dim>::first, both_areas, site.first_surface);
+      this->weigh(site, &ContactSite<dim>::second, both_areas, site.second_surface);
+      double sum[2] = {0., 0.};
+      for (const std::uint32_t other : site.line)
+        if (other != no_index)
+          for (unsigned int side = 0; side < 2; ++side)
+            sum[side] += areas[side][other];
+      site.area = std::min(sum[0], sum[1]);
       site.acts = site.area > 0.;
     }
 }
