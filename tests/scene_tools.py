@@ -267,10 +267,10 @@ def compare_tables(a, b):
         values = [abs(float(row[name])) for row in rows_a if row[name] not in ABSENT]
         scale[unit(name)] = max([scale.get(unit(name), 0.)] + values)
     # The momentum of bodies that move against each other is a difference.
-    if "mass [kg]" in names:
+    if {"[N s]", "[kg]", "[m/s]"} <= set(scale):
         scale["[N s]"] = max(scale["[N s]"], scale["[kg]"] * scale["[m/s]"])
     # And a moment about the centre of a body that is hit in the middle is nothing but round-off.
-    if "[N m]" in scale and "[N]" in scale and "[m]" in scale:
+    if {"[N m]", "[N]", "[m]"} <= set(scale):
         scale["[N m]"] = max(scale["[N m]"], scale["[N]"] * scale["[m]"])
     for name in names:
         for p, q in zip(rows_a, rows_b):

@@ -212,10 +212,11 @@ double UpSolver<dim>::runge_kutta_step(const double latest)
   double dt = std::min(suggested_step().dt, latest - now);
   double error_before = std::numeric_limits<double>::infinity();
   for (unsigned int attempt = 0; attempt < most_attempts; ++attempt) {
-    // A rest that is shorter than a tenth of a step is shared with this one.
-    if (dt < latest - now && latest - now < 1.1 * dt)
+    // A rest that is shorter than a tenth of a step is shared with this one, unless it is round-off.
+    constexpr double round_off = 1e-9;
+    if (dt < (1. - round_off) * (latest - now) && latest - now < 1.1 * dt)
       dt = 0.5 * (latest - now);
-    const bool ends_there = dt >= (latest - now) * (1. - 1e-9);
+    const bool ends_there = dt >= (1. - round_off) * (latest - now);
     if (ends_there)
       dt = latest - now;
     const Ledger<dim> book_before = book;
