@@ -62,8 +62,8 @@ def field_of(fields, wet):
 
 
 def draw_points(axes, directory):
-    """The points of all bodies when the field was largest; in 3-D those near the plane of smallest y. Bodies without the field,
-    and rigid ones, are grey."""
+    """The points of all bodies when the field was largest; in 3-D those next to the plane of its smallest y. Bodies without the
+    field, and rigid ones, are grey."""
     frames = {}
     for entry in ElementTree.parse(os.path.join(directory, "solution.pvd")).getroot().iter("DataSet"):
         if entry.get("part") != "0":
@@ -77,12 +77,13 @@ def draw_points(axes, directory):
 
     time, parts = max(bodies.items(), key=lambda item: largest(item[1]))
     flat = all(np.ptp(x[:, 2]) == 0 for x, _ in parts)
-    across = np.concatenate([x[:, 2 if flat else 1] for x, _ in parts])
-    limit = np.inf if flat else across.min() + 0.02 * (np.ptp(across) or 1) + 1e-12
+    shown = [x[:, 1] for x, fields in parts if field_of(fields, wet)[1] is not None]
+    plane, thickness = min(map(np.min, shown)), 0.02 * max(map(np.ptp, shown)) + 1e-12
     limits = largest(parts)
     for x, fields in parts:
         label, value = field_of(fields, wet)
-        front = x[:, 2 if flat else 1] < limit
+        distance = np.abs(x[:, 1] - plane)
+        front = slice(None) if flat else distance < distance.min() + thickness
         place = x[front, 0], x[front, 1 if flat else 2]
         if value is None:
             axes.scatter(*place, c="0.6", s=6, marker="s", linewidths=0)
@@ -115,7 +116,8 @@ def draw_forces(axes, names, data):
     for column, name in enumerate(names):
         if name.endswith("/normal force [N]"):
             force = np.nan_to_num(data[:, column]) / 1e3
-            axes.plot(data[:, 0], np.convolve(force, np.ones(width) / width, mode="same"), label=name.split("/")[0])
+            force = np.pad(force, (width // 2, width - 1 - width // 2), mode="edge")
+            axes.plot(data[:, 0], np.convolve(force, np.ones(width) / width, mode="valid"), label=name.split("/")[0])
     axes.set_xlabel("t [s]")
     axes.set_ylabel("normal force [kN]")
     axes.grid(alpha=0.3)

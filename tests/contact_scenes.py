@@ -565,7 +565,7 @@ CASES = {
     "I3_block": (i3_block, (), 20),
     "contact_laws": (laws, ("quick", "full"), 2),
     "contact_shifts": (shifts, (), 5),
-    "contact_parallel": (parallel, (), 30),
+    "contact_parallel": (parallel, ("full",), 30),
     "contact_examples": (examples, (), 180),
 }
 

@@ -254,8 +254,7 @@ ABSENT = ("", "nan")   # what a table has where there is no material or no conta
 def compare_tables(a, b):
     """Largest difference of two tables, relative to the largest value in any column of the same quantity and unit."""
     def unit(name):
-        quantity = re.sub(r"^.*/", "", name)
-        return re.sub(r"^.*\[", "[", quantity) if "[" in quantity else quantity
+        return name[name.index("["):] if "[" in name else name.split("/")[-1]
 
     rows_a, rows_b = read_table(a, text=True), read_table(b, text=True)
     if len(rows_a) != len(rows_b) or list(rows_a[0]) != list(rows_b[0]):

@@ -324,13 +324,25 @@ typename Body<dim>::Relocation Body<dim>::relocate(const double time)
   }
   moved_points.clear();
 
-  std::vector<Slice> before;
-  before.swap(cell_slices);
   rebuild_slices();
-  result.cells_changed = before.size() != cell_slices.size() ||
-                         !std::equal(before.begin(), before.end(), cell_slices.begin(),
-                                     [](const Slice &a, const Slice &b) { return a.cell == b.cell; });
+  result.cells_changed = cells_changed();
   return result;
+}
+
+template <int dim>
+bool Body<dim>::cells_changed() const
+{
+  return accepted_cells.size() != cell_slices.size() ||
+         !std::equal(cell_slices.begin(), cell_slices.end(), accepted_cells.begin(),
+                     [](const Slice &slice, const CellId cell) { return slice.cell == cell; });
+}
+
+template <int dim>
+void Body<dim>::accept_cells()
+{
+  accepted_cells.clear();
+  for (const Slice &slice : cell_slices)
+    accepted_cells.push_back(slice.cell);
 }
 
 template <int dim>

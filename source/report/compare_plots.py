@@ -1,4 +1,5 @@
 """The plots of the page: each function returns a figure, or None if there is nothing to show."""
+from matplotlib.ticker import MaxNLocator
 import numpy as np
 
 from compare_data import scale
@@ -134,8 +135,8 @@ def profiles(data, field, line):
         left.plot(factor * v1, y1, "o", color=color, ms=2.8, mfc="white", mew=0.8)
         handles.append(handle)
         labels.append("t = %.4g s" % time)
-        common = np.intersect1d(y0, y1)
-        differences.append((common, v1[np.isin(y1, common)] - v0[np.isin(y0, common)]))
+        common, in_first, in_second = np.intersect1d(y0, y1, return_indices=True)
+        differences.append((common, v1[in_second] - v0[in_first]))
     small, small_unit = scale(data.units[field], np.concatenate([d for _, d in differences]))
     for (y, d), color in zip(differences, colors):
         right.plot(small * d, y, color=color, lw=1.1)
@@ -180,7 +181,7 @@ def maps(data, field, time):
         mesh = axis.pcolormesh(x, y, array, rasterized=True, **colors)
         bar = figure.colorbar(mesh, ax=axis, orientation="horizontal", fraction=0.06, pad=0.22 if aspect < 1.2 else 0.12)
         bar.set_label("%s [%s]" % (field, name))
-        bar.locator = matplotlib.ticker.MaxNLocator(4)
+        bar.locator = MaxNLocator(4)
         bar.update_ticks()
         bar.outline.set_visible(False)
         axis.set_title(title, loc="left")

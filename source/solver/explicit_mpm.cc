@@ -57,6 +57,8 @@ void ExplicitMPM<dim>::prepare()
   }
   for (const auto &continuum : continua)
     continuum->number_nodes(common);
+  for (const auto &body : scene.bodies)
+    body->accept_cells();
   contact.match_nodes();
 }
 
@@ -190,7 +192,15 @@ void ExplicitMPM<dim>::relocate_points()
     if (scene.probes)
       scene.probes->migrate();
   }
-  if (flags[leaves_rank] || flags[cells_changed])
+  // On several ranks nodes are numbered anew when they would be on one, and not when a point of an occupied
+  // cell changes its rank: some things are looked for when nodes change, and must not depend on the partition.
+  if (flags[leaves_rank] && parallel) {
+    int changed = 0;
+    for (const auto &body : scene.bodies)
+      changed |= body->cells_changed();
+    flags[cells_changed] = dealii::Utilities::MPI::max(changed, grid.communicator());
+  }
+  if (flags[cells_changed])
     prepare();
 }
 

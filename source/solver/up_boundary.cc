@@ -105,7 +105,7 @@ void UpBoundary<dim>::find_mesh_pressures()
       if (condition->fluid() == Condition<dim>::Fluid::pressure)
         for (const unsigned int boundary : condition->place.boundaries)
           if ((bits >> boundary) & 1)
-            pressures.push_back({node.pressure, node.position, condition.get()});
+            pressures.push_back({node.pressure, node.position, condition.get(), 0.});
   }
 }
 
@@ -151,13 +151,23 @@ void UpBoundary<dim>::carry(const ActiveNodes<dim> &active, Piece &piece) const
 }
 
 template <int dim>
-bool UpBoundary<dim>::is_covered(const Piece &piece) const
+bool UpBoundary<dim>::is_covered(Piece &piece) const
 {
+  using Interface = typename ContactParameters<dim>::Interface;
   dealii::Point<dim> beyond = piece.point.initial_position;
   beyond += 1e-4 * grid.smallest_cell_size() / piece.point.area.norm() * piece.point.area;
-  for (const auto &body : scene.bodies)
-    if (body.get() != piece.body && body->material().mixture() && body->shape()->distance(beyond) < 0.)
+  for (const auto &body : scene.bodies) {
+    if (body.get() == piece.body || body->n_global_points() == 0 || !(body->shape()->distance(beyond) < 0.))
+      continue;
+    if (body->material().mixture())
       return true;
+    for (const auto &contact : scene.contacts)
+      if ((contact.first == body->name() && contact.second == piece.body->name()) ||
+          (contact.second == body->name() && contact.first == piece.body->name())) {
+        piece.otherwise = contact.pressure;
+        return contact.interface == Interface::impermeable;
+      }
+  }
   return false;
 }
 
@@ -198,7 +208,7 @@ void UpBoundary<dim>::prescribe_face(const Piece &piece, const unsigned int axis
     dealii::Point<dim> x;
     for (unsigned int d = 0; d < dim; ++d)
       x[d] = grid.planes(d)[grid.lattice(piece.cell)[d] + ((v >> d) & 1)];
-    pressures.push_back({unknowns[v], x, piece.pressure});
+    pressures.push_back({unknowns[v], x, piece.pressure, piece.otherwise});
   }
 }
 
@@ -214,20 +224,21 @@ void UpBoundary<dim>::share_pressures()
         number = scene.conditions[c].get() == given.condition ? int(c) : number;
       mine.push_back(given.unknown);
       mine.push_back(number);
+      mine.push_back(given.otherwise);
       for (unsigned int d = 0; d < dim; ++d)
         mine.push_back(given.position[d]);
     }
     pressures.clear();
     const dealii::IndexSet &relevant = space.relevant()[1];
     for (const auto &values : dealii::Utilities::MPI::all_gather(grid.communicator(), mine))
-      for (std::size_t i = 0; i < values.size(); i += 2 + dim) {
-        GivenPressure given{Index(values[i]), {}, nullptr};
+      for (std::size_t i = 0; i < values.size(); i += 3 + dim) {
+        GivenPressure given{Index(values[i]), {}, nullptr, values[i + 2]};
         if (!relevant.is_element(given.unknown - space.first_pressure()))
           continue;
         if (values[i + 1] >= 0.)
           given.condition = scene.conditions[std::size_t(values[i + 1])].get();
         for (unsigned int d = 0; d < dim; ++d)
-          given.position[d] = values[i + 2 + d];
+          given.position[d] = values[i + 3 + d];
         pressures.push_back(given);
       }
   }
@@ -260,7 +271,7 @@ void UpBoundary<dim>::prescribe(const double start, const double end, BlockVecto
     if (!space.owned()[1].is_element(local))
       continue;
     coordinates(given.position, x);
-    unknown.block(1)(local) = given.condition ? given.condition->fluid_value(x, end) : 0.;
+    unknown.block(1)(local) = given.condition ? given.condition->fluid_value(x, end) : given.otherwise;
   }
   unknown.compress(dealii::VectorOperation::insert);
 }
@@ -391,7 +402,7 @@ void UpBoundary<dim>::add_penalties(const TimeLevel &level, const StepState &sta
     const double beta = penalty * piece.body->material().mixture()->mobility() / grid.smallest_cell_size() *
                         piece.point.area.norm();
     coordinates(piece.point.position, x);
-    double p = -(piece.pressure ? piece.pressure->fluid_value(x, level.time) : 0.);
+    double p = -(piece.pressure ? piece.pressure->fluid_value(x, level.time) : piece.otherwise);
     std::copy_n(space.pressures(piece.cell), n, unknowns.begin());
     for (unsigned int i = 0; i < n; ++i) {
       const Index index = unknowns[i] - space.first_pressure();

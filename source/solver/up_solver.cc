@@ -78,6 +78,8 @@ void UpSolver<dim>::prepare()
       if (body->material().mixture() && method != Method::points_at_rest)
         saturated.push_back(slice.cell);
     }
+  for (const auto &body : scene.bodies)
+    body->accept_cells();
   sort(solid);
   sort(saturated);
   unknowns.distribute(solid, saturated);

@@ -87,13 +87,17 @@ public:
 
   struct Relocation
   {
-    bool cells_changed = false; ///< a cell got its first point or lost its last one
+    bool cells_changed = false; ///< cells_changed() after it
     bool leaves_rank =
         false; ///< a point has entered a cell of another rank: synchronise() before the next step
   };
   /// Assign the noted points to their new cells. Throws NumericalError for a point that left the mesh or
   /// moved further than one cell.
   Relocation relocate(double time);
+
+  /// Whether a cell of this rank has got its first point or lost its last one since the cells were accepted.
+  bool cells_changed() const;
+  void accept_cells();
 
   /// Bring the particle handler up to date: points move to the rank that owns their cell, storage is in cell
   /// order again. Collective. Throws NumericalError if a point gets lost.
@@ -126,6 +130,7 @@ private:
   dealii::Point<dim> *first_position = nullptr;
   std::vector<CellId> cell_of_point;
   std::vector<Slice> cell_slices;
+  std::vector<CellId> accepted_cells;
   std::vector<std::uint32_t> handles_by_cell;
   std::vector<std::uint32_t> count_in_cell;
   std::vector<std::uint32_t> moved_points;

@@ -66,7 +66,8 @@ private:
   {
     Index unknown;
     dealii::Point<dim> position;
-    const Condition<dim> *condition; ///< nullptr: zero
+    const Condition<dim> *condition; ///< nullptr: nothing but `otherwise`
+    double otherwise;                ///< [Pa] where no condition says it: 0, or that of a drained contact
   };
   /// A piece of a body's surface: its carrier's unknowns, and how the pressure is prescribed on it.
   struct Piece
@@ -77,6 +78,7 @@ private:
     std::vector<double> N;
     bool weak_pressure = false;
     const Condition<dim> *pressure = nullptr;
+    double otherwise = 0.; ///< as in GivenPressure
     CellId cell;
     std::array<double, Space<dim>::n_pressures> M;
   };
@@ -86,7 +88,8 @@ private:
   void find_pieces(const ActiveNodes<dim> &active);
   void carry(const ActiveNodes<dim> &active, Piece &piece) const;
   void find_pressure(Piece &piece);
-  bool is_covered(const Piece &piece) const;
+  /// By another body that lets no fluid out; sets what acts where a drained contact does.
+  bool is_covered(Piece &piece) const;
   void prescribe_face(const Piece &piece, unsigned int axis);
   void share_pressures();
   /// Calls an action with each piece of surface that a force acts on, and the force [N].
