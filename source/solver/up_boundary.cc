@@ -197,7 +197,8 @@ void UpBoundary<dim>::find_pressure(Piece &piece)
   if (axis >= 0) {
     const double offset =
         (piece.point.position[axis] - grid.lower(piece.cell, axis)) / grid.size(piece.cell, axis);
-    if (std::abs(offset - (piece.point.area[axis] > 0. ? 1. : 0.)) < on_plane) {
+    // On the face, or risen over it: there are no pressures beyond.
+    if ((piece.point.area[axis] > 0. ? 1. - offset : offset) < on_plane) {
       prescribe_face(piece, axis);
       return;
     }
