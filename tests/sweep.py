@@ -151,8 +151,12 @@ def check_failure(check, peat, root):
     arguments = (peat, COLUMN, directory, ["Explicit MPM/Step factor=0.8,3"], SHORT + ["--set", "Constants/cells=10"])
     sweep = Sweep(*arguments)
     states = [run["state"] for run in sweep.summary["runs"]]
-    check("a run that blows up is listed as failed", sweep.code == 0 and states == ["done", "failed"] and
-          "leaves the mesh" in sweep.summary["runs"][1]["reason"], sweep.summary["runs"][1]["reason"])
+    # What is noticed first depends on the round-off that grows: energy from nowhere, points that leave their cells or the mesh,
+    # numbers that are not finite. Whatever it is, the reason says when it was and what is to be changed.
+    reason = sweep.summary["runs"][1]["reason"]
+    check("a run that blows up is listed as failed", sweep.code == 0 and states == ["done", "failed"], reason)
+    check("and the reason names the moment and the step", "t = " in reason and
+          reason.endswith("; 'Step factor' 3 is above the stable step, take 1 at most"), reason)
     before = sweep.changed("3")
     check("and is not tried again", Sweep(*arguments).changed("3") == before)
 

@@ -2,10 +2,42 @@
 
 #include <deal.II/base/mpi.h>
 
+#include <cmath>
 #include <sstream>
 
 namespace peat {
 namespace {
+/// What is not finite at the first such point of this rank, and where that is; empty if there is none.
+template <int dim>
+std::string first_not_finite(const Scene<dim> &scene, const Grid<dim> &grid)
+{
+  const auto finite = [](const double *row, const int first, const unsigned int n) {
+    return first < 0 || std::all_of(row + first, row + first + n, [](double v) { return std::isfinite(v); });
+  };
+  for (const auto &body : scene.bodies)
+    for (const Slice &slice : body->slices())
+      for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
+        const std::uint32_t handle = body->handles()[i];
+        const double *row = body->row(handle);
+        const Layout &layout = body->layout();
+        const std::string what = !finite(row, layout.stress, dim == 2 ? 4 : 6) ? "stress"
+                                 : !finite(row, layout.pressure, 1)            ? "pressure"
+                                 : !finite(row, layout.velocity, dim)          ? "velocity"
+                                                                               : "";
+        if (what.empty())
+          continue;
+        // Its place may not be finite either; its cell is that of the step's start.
+        dealii::Point<dim> middle;
+        for (unsigned int d = 0; d < dim; ++d)
+          middle[d] = grid.lower(slice.cell, d) + 0.5 * grid.size(slice.cell, d);
+        std::ostringstream text;
+        text << "the " << what << " of point " << body->id(handle) << " of body '" << body->name()
+             << "', in the cell around (" << middle << "), is not finite";
+        return text.str();
+      }
+  return "";
+}
+
 template <int dim>
 std::vector<NodeId> with_neighbours(const Grid<dim> &grid, const std::vector<NodeId> &nodes)
 {
@@ -173,9 +205,12 @@ void ExplicitMPM<dim>::relocate_points()
   }
 
   if (flags[not_finite]) {
+    const auto all =
+        dealii::Utilities::MPI::all_gather(grid.communicator(), first_not_finite<dim>(scene, grid));
+    const auto first = std::find_if(all.begin(), all.end(), [](const auto &one) { return !one.empty(); });
     std::ostringstream text;
-    text << "a stress, pressure or velocity is not finite, t = " << now << " s, step "
-         << continua.front()->fields().dt << " s; use a smaller 'Step factor'";
+    text << (first == all.end() ? "a stress, pressure or velocity is not finite" : *first) << ", t = " << now
+         << " s, step " << continua.front()->fields().dt << " s; use a smaller 'Step factor'";
     throw NumericalError(text.str());
   }
   if (flags[error]) {

@@ -26,6 +26,27 @@ int normal_axis(const dealii::Tensor<1, dim> &area)
       axis = d;
   return std::abs(area[axis]) > 0.999999 * area.norm() ? int(axis) : -1;
 }
+
+/// The cell of the material that a piece of surface bounds: the one just behind it or, where the surface has
+/// risen over a grid line into a cell without points, the one below that.
+template <int dim>
+CellId cell_behind(const SurfacePoint<dim> &point, const Space<dim> &space)
+{
+  const Grid<dim> &grid = space.grid();
+  dealii::Point<dim> behind = point.position;
+  behind -= 1e-6 * grid.smallest_cell_size() / point.area.norm() * point.area;
+  auto lattice = grid.locate(behind);
+  const CellId own = grid.cell_at(lattice);
+  if (own == no_index || space.is_solid(own))
+    return own;
+  unsigned int axis = 0;
+  for (unsigned int d = 1; d < dim; ++d)
+    if (std::abs(point.area[d]) > std::abs(point.area[axis]))
+      axis = d;
+  lattice[axis] -= point.area[axis] > 0. ? 1 : -1;
+  const CellId below = grid.cell_at(lattice);
+  return below != no_index && grid.is_owned(below) && space.is_solid(below) ? below : own;
+}
 } // namespace
 
 template <int dim>
@@ -118,9 +139,7 @@ void UpBoundary<dim>::find_pieces(const ActiveNodes<dim> &active)
       Piece piece;
       piece.point = point;
       piece.body = &scene.body(name);
-      dealii::Point<dim> behind = point.position;
-      behind -= 1e-6 * grid.smallest_cell_size() / point.area.norm() * point.area;
-      piece.cell = grid.cell_at(grid.locate(behind));
+      piece.cell = cell_behind(point, space);
       carry(active, piece);
       if (piece.body->material().mixture() && space.has_pressure() && piece.cell != no_index &&
           space.is_saturated(piece.cell))
@@ -188,7 +207,8 @@ void UpBoundary<dim>::find_pressure(Piece &piece)
   if (axis >= 0) {
     const double offset =
         (piece.point.position[axis] - grid.lower(piece.cell, axis)) / grid.size(piece.cell, axis);
-    if (std::abs(offset - (piece.point.area[axis] > 0. ? 1. : 0.)) < on_plane) {
+    // On the face, or risen over it: there are no pressures beyond.
+    if ((piece.point.area[axis] > 0. ? 1. - offset : offset) < on_plane) {
       prescribe_face(piece, axis);
       return;
     }

@@ -228,12 +228,14 @@ double UpSolver<dim>::runge_kutta_step(const double latest)
     error_before = error;
     const bool free = parameters.fixed_step > 0. || jumps;
     if (free || error <= parameters.step_tolerance) {
+      // Only what is rejected shortens the steps, and not where that does not help: an error that has a
+      // floor, as that of points which begin to reach other nodes, would else shorten them for ever.
       const double growth = std::min(parameters.largest_growth,
                                      0.8 * std::sqrt(parameters.step_tolerance / std::max(error, 1e-300)));
-      const double before = std::max(dt, ends_there ? next_step : 0.);
+      const double wanted = std::max(next_step, dt);
       next_step = parameters.fixed_step > 0. ? parameters.fixed_step
-                  : jumps                    ? dt
-                                             : std::max(dt * growth, ends_there && growth > 1. ? before : 0.);
+                  : jumps                    ? wanted
+                                             : std::max(dt * std::max(1., growth), ends_there ? wanted : 0.);
       // A step that hardly grows stays, and with it its factorisation.
       constexpr double hardly = 1.3;
       if (next_step > dt && next_step < hardly * dt && !ends_there)
