@@ -188,6 +188,9 @@ Demand demand(const Case<dim> &parameters, const StageParameters &stage, const S
   };
   for (const auto &body : scene.bodies)
     waves(is_moving(*body), "body '" + body->name() + "' moves at the start");
+  // What meets in a contact, and how fast, only the run can tell.
+  for (const auto &contact : scene.contacts)
+    waves(true, "'" + contact.first + "' and '" + contact.second + "' may hit each other");
 
   constexpr unsigned int n_samples = 400;
   constexpr double much = 0.1;
