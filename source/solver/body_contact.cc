@@ -259,9 +259,8 @@ double BodyContact<dim>::outdated_change()
       continue;
     const Vector compliance = compliance_of(site);
     const Response response = respond_at(site, compliance);
-    if (this->kept_mode(response) != site.mode)
-      for (unsigned int d = 0; d < dim; ++d)
-        largest = std::max(largest, compliance[d] * std::abs(response.impulse[d] - site.impulse[d]));
+    for (unsigned int d = 0; d < dim; ++d)
+      largest = std::max(largest, compliance[d] * std::abs(response.impulse[d] - site.impulse[d]));
   }
   return largest;
 }

@@ -239,7 +239,7 @@ void ContactSolver<dim>::take_reactions()
 template <int dim>
 bool ContactSolver<dim>::is_outdated()
 {
-  // Impulses this much smaller than the largest may still have the wrong sign; the next step sees to them.
+  // Of the largest change in the step: so much may be left to the next one.
   constexpr double negligible = 1e-4;
   if (is_empty())
     return false;

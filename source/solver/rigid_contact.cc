@@ -341,7 +341,7 @@ double RigidContact<dim>::outdated_change()
   double largest = 0.;
   for (std::size_t s = 0; s < sites.size(); ++s) {
     const ContactSite<dim> &site = sites[s];
-    if (!site.counts || !site.acts || this->kept_mode(responses[s]) == site.mode)
+    if (!site.counts || !site.acts)
       continue;
     const Vector compliance = this->compliance(continuum, site.second_surface);
     for (unsigned int d = 0; d < dim; ++d)

@@ -23,7 +23,7 @@ struct Pressed
   {
     const bool flat = dim == 2;
     const std::string lower = flat ? "0.3, 0.13, 1.7, 0.93" : "0.3, 0.3, 0.13, 1.7, 1.7, 0.93",
-                      upper = flat ? "0.6, 0.925, 1.31, 1.5" : "0.6, 0.6, 0.925, 1.31, 1.2, 1.5";
+                      upper = flat ? "0.6, 0.929, 1.31, 1.5" : "0.6, 0.6, 0.929, 1.31, 1.2, 1.5";
     std::ostringstream text;
     text << "set Dimension = " << dim
          << "\nset Scheme = semi-implicit\nset Gravity = " << (flat ? "3, -10" : "3, 0, -10")
@@ -94,7 +94,7 @@ struct Pressed
   {
     return continua[continuum]->response().acceleration;
   }
-  /// Of a node of the ground; the points near the contact have all that contact acts on.
+  /// On the nodes of the ground.
   std::vector<double> random_forces(const unsigned int seed) const
   {
     std::mt19937 generator(seed);
@@ -193,9 +193,6 @@ void check(const std::string &law, const std::string &interface, const bool rigi
     }
     BOOST_TEST(left_motion < 1e-11 * *std::max_element(motion_g.begin(), motion_g.end()));
     BOOST_TEST(left_flux < 1e-11 * *std::max_element(flux_g.begin(), flux_g.end()));
-
-    // What contact takes as its own does not make it approach, part or slide otherwise.
-    scene.pair->take_reactions();
   }
 }
 } // namespace
@@ -203,7 +200,7 @@ void check(const std::string &law, const std::string &interface, const bool rigi
 BOOST_AUTO_TEST_CASE(restrained_in_the_plane)
 {
   for (const bool rigid : {false, true})
-    for (const std::string law : {"frictionless", "stick", "coulomb"})
+    for (const std::string law : {"frictionless", "stick", "coulomb\n set Friction = 0.3"})
       for (const std::string interface : {"impermeable", "drained"})
         check<2>(law, interface, rigid);
 }

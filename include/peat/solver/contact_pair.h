@@ -70,8 +70,7 @@ public:
   virtual void begin(double dt) = 0;
   /// Find the impulses, given those of the other contacts. Returns the largest change of a velocity [m/s].
   virtual double solve() = 0;
-  /// The largest change of a velocity [m/s] that solve() would bring at sites which are not in the mode any
-  /// more in which their impulse was found; on this rank.
+  /// The largest change of a velocity [m/s] that solve() would bring now, on this rank.
   virtual double outdated_change() = 0;
 
   /// The sites are now as they will be while pressures are solved for.

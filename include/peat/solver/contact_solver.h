@@ -37,7 +37,7 @@ public:
   void restrain() override;
   /// What the last restrain() found happens.
   void take_reactions();
-  /// Whether solve() would find that other sites touch, slide or stick than those that were held.
+  /// Whether solve() would find other impulses now: sites that part, meet, slide or stick, other friction.
   bool is_outdated();
 
 private:
