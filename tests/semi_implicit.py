@@ -160,13 +160,14 @@ def i1(c):
 
 
 def c4(c):
-    # Steps 20 times as long as explicit ones.
-    contact_scenes.c4(Implicit(c, **{"Explicit MPM/Step factor": 0.4}))
+    # Steps 14 times as long as explicit ones. That the points at the base begin to reach over a face of the mesh excites the
+    # gravest undrained wave more than in explicit steps, and it fades slowly.
+    contact_scenes.c4(Implicit(c), 2e-2)
 
 
 def against_explicit(c):
     """Two-dimensional impacts of which only balances are exact: else what explicit steps of the same length find."""
-    for scene, settings in (("I3_block_drop", {"Constants/cells": 12}), ("I3_saturated_discs", {"Constants/cells": 5})):
+    for scene, settings in (("I3_block_drop", {"Constants/End": 0.02}), ("I3_saturated_discs", {"Constants/cells": 5})):
         found = {}
         for scheme in "explicit", "semi-implicit":
             run = c.run(scene, dict(settings, **{"Scheme": scheme, "Output/Pictures": "false"}))
