@@ -225,6 +225,7 @@ void ContactSolver<dim>::restrain()
       std::fill(acceleration.begin(), acceleration.end(), 0.);
     }
   std::fill(tried_accelerations.begin(), tried_accelerations.end(), typename RigidBody<dim>::Generalised());
+  // Equations (53) and (54) of theory.md.
   for_each([](auto &pair) { pair.forget_reactions(); });
   sweep([](auto &pair) { pair.restrain_motion(); });
   sweep([](auto &pair) { pair.restrain_flux(); });
