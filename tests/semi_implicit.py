@@ -209,7 +209,8 @@ def contact_parallel(c):
         for n, run in zip(c.rank_counts[1:], runs[1:]):
             for table in "statistics.csv", "probes.csv":
                 difference, column = scene_tools.compare_tables(runs[0].directory + "/" + table, run.directory + "/" + table)
-                c.below("%s, %d ranks, %s (%s)" % (scene, n, table[:-4], column), difference, 1e-10)
+                # Ranks add up in other orders; impact and the iterations make more of that than steps alone.
+                c.below("%s, %d ranks, %s (%s)" % (scene, n, table[:-4], column), difference, 1e-9)
 
 
 # name: (function, labels, seconds on one core)
