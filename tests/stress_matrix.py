@@ -21,7 +21,7 @@ SCHEMES = {
 SCHEMES_OF = {"load": ("gimp", "q1", "gimp flip", "gimp pic", "gimp semi-implicit", "q1 semi-implicit", "gimp implicit",
                        "q1 implicit"),
               "impact": ("gimp", "q1", "gimp flip", "gimp semi-implicit", "gimp implicit")}
-REFUSED = {"impact": ("gimp semi-implicit", "gimp implicit")}  # once is enough
+REFUSED = {"impact": ("gimp implicit",)}  # once is enough
 
 AXES = {
     "k": (1e-12, 1e-10, 1e-8, 1e-6, 1e-5, 1e-3, 1e-2, 1e-1),
@@ -128,8 +128,6 @@ def pairs():
 def above_the_limit():
     scenes = (("load", {}), ("load", {"k": 1e-1}), ("load", {"fill": 0.05}), ("impact", {"v": 0.1}))
     for (scene, settings), scheme, factor in itertools.product(scenes, ("gimp", "q1", "gimp semi-implicit"), TOO_LARGE):
-        if scene == "impact" and scheme == "gimp semi-implicit":
-            continue
         yield Case(scene, "%s, above the limit" % scheme, dict(SCHEMES[scheme], **settings, **{"step factor": factor}), True)
 
 
@@ -140,7 +138,7 @@ def at_random(n, seed):
     linear = lambda low, high: float("%.3g" % generator.uniform(low, high))
     for scene in SCENES:
         for _ in range(n):
-            scheme = generator.choice([name for name in SCHEMES_OF[scene] if name not in REFUSED.get(scene, ())])
+            scheme = generator.choice([name for name in SCHEMES_OF[scene] if scene == "load" or "implicit" not in name])
             settings = dict(SCHEMES[scheme])
             settings.update({"k": log(1e-12, 1e-1), "nu": generator.choice((linear(0, 0.45), float("%.4g" % (0.5 - log(1e-4, 0.05))))),
                              "n": linear(0.05, 0.9), "K_f": log(1e5, 2.2e9), "points": generator.randint(1, 5),
@@ -167,7 +165,7 @@ def some_of(cases, share):
 
 
 def few_cases():
-    """A small sample of all kinds for the quick tests: those that the matrix found sound, and one of each refusal."""
+    """A small sample of all kinds for the quick tests: those that the matrix found sound."""
     base = [("load", {}), ("load", {"fill": 0.01}), ("load", {"nu": 0.499, "k": 1e-6}), ("load", {"steps": "semi-implicit", "k": 1e-2}),
             ("load", {"steps": "implicit", "fill": 0.01}), ("load", {"basis": "q1", "aspect": 5}), ("load", {"K_f": 1e5}),
             ("load", {"steps": "implicit", "transfer": "pic"}), ("impact", {}), ("impact", {"ratio": 1e3}),

@@ -135,10 +135,10 @@ def check_refused(check, peat, root):
     check("what means nothing is not set", sweep.summary["runs"][2]["values"] == ["fem", ""])
 
     sweep = Sweep(peat, BAR_ON_COLUMN, os.path.join(root, "finest"),
-                  ["Scheme=explicit,semi-implicit", "Constants/cells=10,20"],
+                  ["Scheme=explicit,implicit", "Constants/cells=10,20"],
                   ["--set", "Constants/Gap=1e-3", "--set", "Constants/After=1e-2"])
     states = [run["state"] for run in sweep.summary["runs"]]
-    check("semi-implicit steps with contacts are refused", sweep.code == 0 and states == ["done", "done", "refused", "refused"] and
+    check("implicit steps with contacts are refused", sweep.code == 0 and states == ["done", "done", "refused", "refused"] and
           "'Contacts'" in sweep.summary["runs"][2]["reason"], " ".join(states))
     check("without references the finest run is the measure", sweep.summary["finest"] == "explicit_20" and
           "no references" in sweep.out and sweep.run("explicit_20")["error"] is None and

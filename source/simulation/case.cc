@@ -398,8 +398,6 @@ std::string Case<dim>::why_not_semi_implicit() const
 {
   if (!is_saturated())
     return "it is for saturated bodies, and there is none";
-  if (!contacts.empty())
-    return "it does not go with 'Contacts' yet";
   if (!scheme.pressure_of_cells)
     return "it has one pressure a cell, but 'Explicit MPM/Pressure = point'";
   const Mixture *first = nullptr;

@@ -125,6 +125,17 @@ double wave_speed(const Body<dim> &body)
   return mixture ? mixture->undrained_speed(M) : std::sqrt(M / body.material().density());
 }
 
+/// Of a saturated body's undrained wave, as the front of an impact needs it [s].
+template <int dim>
+double passage_of_cell(const Scene<dim> &scene, const Grid<dim> &grid)
+{
+  double fastest = 0.;
+  for (const auto &body : scene.bodies)
+    if (body->material().mixture())
+      fastest = std::max(fastest, wave_speed(*body));
+  return grid.smallest_cell_size() / fastest;
+}
+
 template <int dim>
 double largest_extent(const Body<dim> &body, MPI_Comm communicator)
 {
@@ -188,6 +199,9 @@ Demand demand(const Case<dim> &parameters, const StageParameters &stage, const S
   };
   for (const auto &body : scene.bodies)
     waves(is_moving(*body), "body '" + body->name() + "' moves at the start");
+  // What meets in a contact, and how fast, only the run can tell.
+  for (const auto &contact : scene.contacts)
+    waves(true, "'" + contact.first + "' and '" + contact.second + "' may hit each other");
 
   constexpr unsigned int n_samples = 400;
   constexpr double much = 0.1;
@@ -244,6 +258,8 @@ std::vector<SchemeEstimate> estimate_schemes(const Case<dim> &parameters, const 
       const StableStep stable = stable_step<dim>(scene.bodies, grid, scheme.seepage_inertia, semi);
       if (semi && asked.waves)
         estimate.largest_step = asked.crossing / steps_per_period;
+      if (semi && !scene.contacts.empty())
+        estimate.largest_step = std::min(estimate.largest_step, passage_of_cell(scene, grid));
       const double wanted = std::min(scheme.step_factor * stable.dt, estimate.largest_step);
       estimate.dt = scheme.fixed_step > 0. ? scheme.fixed_step : wanted;
       estimate.limit = scheme.fixed_step > 0.                    ? "'Time step'"

@@ -93,6 +93,7 @@ void BodyContact<dim>::begin(const double dt)
   }
   for (ContactSite<dim> &site : sites) {
     site.impulse = Vector();
+    site.mode = ContactMode::open;
     if (site.acts)
       site.relative_velocity = this->velocity(first.fields().velocity, site.first_surface) -
                                this->velocity(second.fields().velocity, site.second_surface);
@@ -199,29 +200,42 @@ void BodyContact<dim>::find_surfaces()
 }
 
 template <int dim>
+typename BodyContact<dim>::Vector BodyContact<dim>::compliance_of(const ContactSite<dim> &site) const
+{
+  return this->compliance(first, site.first_surface) + this->compliance(second, site.second_surface);
+}
+
+template <int dim>
+typename BodyContact<dim>::Response BodyContact<dim>::respond_at(const ContactSite<dim> &site,
+                                                                 const Vector &compliance) const
+{
+  Vector relative = this->velocity(first.fields().new_velocity, site.first_surface) -
+                    this->velocity(second.fields().new_velocity, site.second_surface);
+  for (unsigned int d = 0; d < dim; ++d)
+    relative[d] += compliance[d] * site.impulse[d];
+  std::pair<double, double> fluid = {0., 0.};
+  if (first.is_saturated())
+    fluid = this->fluid_force(first, site.first_surface, site.normal, site.area);
+  if (second.is_saturated()) {
+    const auto other = this->fluid_force(second, site.second_surface, -site.normal, site.area);
+    const double share = first.is_saturated() ? 0.5 : 1.;
+    fluid.first = (1. - share) * fluid.first + share * other.first;
+    fluid.second = (1. - share) * fluid.second + share * other.second;
+  }
+  fluid.first -= fluid.second * (site.impulse * site.normal);
+  return this->respond(site, relative, compliance, fluid);
+}
+
+template <int dim>
 double BodyContact<dim>::solve()
 {
   double largest = 0.;
   for (ContactSite<dim> &site : sites) {
     if (!site.counts || !site.acts)
       continue;
-    const Vector compliance =
-        this->compliance(first, site.first_surface) + this->compliance(second, site.second_surface);
-    Vector relative = this->velocity(first.fields().new_velocity, site.first_surface) -
-                      this->velocity(second.fields().new_velocity, site.second_surface);
-    for (unsigned int d = 0; d < dim; ++d)
-      relative[d] += compliance[d] * site.impulse[d];
-    std::pair<double, double> fluid = {0., 0.};
-    if (first.is_saturated())
-      fluid = this->fluid_force(first, site.first_surface, site.normal, site.area);
-    if (second.is_saturated()) {
-      const auto other = this->fluid_force(second, site.second_surface, -site.normal, site.area);
-      const double share = first.is_saturated() ? 0.5 : 1.;
-      fluid.first = (1. - share) * fluid.first + share * other.first;
-      fluid.second = (1. - share) * fluid.second + share * other.second;
-    }
-    fluid.first -= fluid.second * (site.impulse * site.normal);
-    const auto response = this->respond(site, relative, compliance, fluid);
+    const Vector compliance = compliance_of(site);
+    const Response response = respond_at(site, compliance);
+    site.mode = this->kept_mode(response);
     const Vector change = response.impulse - site.impulse;
     if (change.norm_square() == 0.)
       continue;
@@ -234,6 +248,79 @@ double BodyContact<dim>::solve()
   this->give_impulses(first, noted[0]);
   this->give_impulses(second, noted[1]);
   return largest;
+}
+
+template <int dim>
+double BodyContact<dim>::outdated_change()
+{
+  double largest = 0.;
+  for (const ContactSite<dim> &site : sites) {
+    if (!site.counts || !site.acts)
+      continue;
+    const Vector compliance = compliance_of(site);
+    const Response response = respond_at(site, compliance);
+    for (unsigned int d = 0; d < dim; ++d)
+      largest = std::max(largest, compliance[d] * std::abs(response.impulse[d] - site.impulse[d]));
+  }
+  return largest;
+}
+
+template <int dim>
+void BodyContact<dim>::hold()
+{
+  held_sites.clear();
+  for (std::uint32_t s = 0; s < sites.size(); ++s) {
+    const ContactSite<dim> &site = sites[s];
+    if (!site.counts || !site.acts || site.mode == ContactMode::open)
+      continue;
+    ContactPair<dim>::hold(s, compliance_of(site));
+    this->note_held_nodes(site, first, site.first_surface, noted[0]);
+    this->note_held_nodes(site, second, site.second_surface, noted[1]);
+  }
+  this->mark_held_nodes(first, noted[0]);
+  this->mark_held_nodes(second, noted[1]);
+}
+
+template <int dim>
+void BodyContact<dim>::restrain_motion()
+{
+  for (const std::uint32_t s : held_sites) {
+    ContactSite<dim> &site = sites[s];
+    const Vector relative = this->velocity(first.response().acceleration, site.first_surface) -
+                            this->velocity(second.response().acceleration, site.second_surface);
+    const Vector force = this->reaction(site, relative);
+    site.reaction += force;
+    this->push(noted[0], site.first_surface, -force);
+    this->push(noted[1], site.second_surface, force);
+  }
+  this->give_reactions(first, noted[0]);
+  this->give_reactions(second, noted[1]);
+}
+
+template <int dim>
+void BodyContact<dim>::restrain_flux()
+{
+  for (const std::uint32_t s : held_sites)
+    if (const ContactSite<dim> &site = sites[s]; site.closes_flux) {
+      this->note_flux_reaction(first, site.first_surface, site.normal, noted[0]);
+      this->note_flux_reaction(second, site.second_surface, -site.normal, noted[1]);
+    }
+  this->give_flux_reactions(first, noted[0]);
+  this->give_flux_reactions(second, noted[1]);
+}
+
+template <int dim>
+void BodyContact<dim>::take_reactions()
+{
+  for (const std::uint32_t s : held_sites) {
+    ContactSite<dim> &site = sites[s];
+    const Vector impulse = this->step_length * site.reaction;
+    site.impulse += impulse;
+    this->push(noted[0], site.first_surface, -impulse);
+    this->push(noted[1], site.second_surface, impulse);
+  }
+  this->give_impulses(first, noted[0]);
+  this->give_impulses(second, noted[1]);
 }
 
 template <int dim>

@@ -26,7 +26,8 @@ ContactPair<dim>::respond(const ContactSite<dim> &site, const Vector &relative, 
   for (unsigned int d = 0; d < dim; ++d)
     normal_compliance += n[d] * n[d] * compliance[d];
   if (law.ties()) {
-    response.kind = Response::Kind::sticks;
+    response.mode = ContactMode::sticks;
+    response.bears_shear = true;
     for (unsigned int d = 0; d < dim; ++d)
       response.impulse[d] = compliance[d] > 0. ? relative[d] / compliance[d] : 0.;
     return response;
@@ -51,13 +52,15 @@ ContactPair<dim>::respond(const ContactSite<dim> &site, const Vector &relative, 
     normal_force -= fluid_force.first + fluid_force.second * normal_impulse;
   normal_force = std::max(0., normal_force);
   response.impulse = normal_impulse * n;
-  if (wanted <= dt * law.shear_limit(normal_force, site.area, false)) {
-    response.kind = Response::Kind::sticks;
+  const double bearable = dt * law.shear_limit(normal_force, site.area, false);
+  if (wanted <= bearable) {
+    response.mode = ContactMode::sticks;
+    response.bears_shear = bearable > 0.;
     response.impulse += stick;
     return response;
   }
   const double shear = std::min(wanted, dt * law.shear_limit(normal_force, site.area, true));
-  response.kind = Response::Kind::slides;
+  response.mode = ContactMode::slides;
   response.slip_direction = stick / wanted;
   response.slip_ratio =
       normal_force > 0. && shear < wanted
@@ -270,6 +273,112 @@ void ContactPair<dim>::change_carrying_velocity(Continuum<dim> &continuum, Nodal
   noted.add_up(parallel, [&](const std::size_t row, const double impulse) {
     continuum.carrying_velocity()[row] += node_compliance(continuum, row / dim)[row % dim] * impulse;
   });
+}
+
+template <int dim>
+ContactMode ContactPair<dim>::kept_mode(const Response &response)
+{
+  return response.mode == ContactMode::sticks && !response.bears_shear ? ContactMode::slides : response.mode;
+}
+
+template <int dim>
+void ContactPair<dim>::hold(const std::uint32_t s, const Vector &compliance)
+{
+  ContactSite<dim> &site = sites[s];
+  double normal_compliance = 0.;
+  for (unsigned int d = 0; d < dim; ++d) {
+    normal_compliance += site.normal[d] * site.normal[d] * compliance[d];
+    site.mass[d] = compliance[d] > 0. ? 1. / compliance[d] : 0.;
+  }
+  site.normal_mass = normal_compliance > 0. ? 1. / normal_compliance : 0.;
+  site.closes_flux = parameters.interface == ContactParameters<dim>::Interface::impermeable &&
+                     site.impulse * site.normal > 0.;
+  held_sites.push_back(s);
+}
+
+template <int dim>
+void ContactPair<dim>::note_held_nodes(const ContactSite<dim> &site, const Continuum<dim> &continuum,
+                                       const SurfaceNodes &surface, NodalAdditions<dim> &noted) const
+{
+  if (!continuum.is_saturated() || (site.closes_flux && site.mode != ContactMode::sticks))
+    return;
+  Vector ones;
+  for (unsigned int d = 0; d < dim; ++d)
+    ones[d] = 1.;
+  for (unsigned int k = 0; k < 3; ++k)
+    if (surface.weight[k] > 0.)
+      noted.note(surface.node[k], ones);
+}
+
+template <int dim>
+void ContactPair<dim>::mark_held_nodes(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const
+{
+  if (continuum.is_saturated())
+    noted.add_up(parallel, [&](const std::size_t row, double) { continuum.response().held[row] = 1; });
+}
+
+template <int dim>
+void ContactPair<dim>::forget_reactions()
+{
+  for (const std::uint32_t s : held_sites)
+    sites[s].reaction = Vector();
+}
+
+template <int dim>
+typename ContactPair<dim>::Vector ContactPair<dim>::reaction(const ContactSite<dim> &site,
+                                                             const Vector &relative) const
+{
+  if (site.mode != ContactMode::sticks)
+    return site.normal_mass * (relative * site.normal) * site.normal;
+  Vector force;
+  for (unsigned int d = 0; d < dim; ++d)
+    force[d] = site.mass[d] * relative[d];
+  return force;
+}
+
+template <int dim>
+void ContactPair<dim>::give_reactions(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const
+{
+  std::vector<double> &acceleration = continuum.response().acceleration;
+  noted.add_up(parallel, [&](const std::size_t row, const double force) {
+    acceleration[row] += node_compliance(continuum, row / dim)[row % dim] * force;
+  });
+}
+
+template <int dim>
+void ContactPair<dim>::note_flux_reaction(const Continuum<dim> &continuum, const SurfaceNodes &surface,
+                                          const Vector &n, NodalAdditions<dim> &noted) const
+{
+  if (!continuum.is_saturated())
+    return;
+  const NodalResponse &response = continuum.response();
+  const auto conductance = [&](const unsigned int k, const unsigned int d) {
+    return response.conductance[std::size_t(surface.node[k]) * dim + d];
+  };
+  double sum = 0.;
+  for (unsigned int k = 0; k < 3; ++k)
+    if (surface.weight[k] > 0.)
+      for (unsigned int d = 0; d < dim; ++d)
+        sum += surface.weight[k] * surface.weight[k] * n[d] * n[d] * conductance(k, d);
+  if (sum == 0.)
+    return;
+  const double force = velocity(response.flux, surface) * n / sum;
+  for (unsigned int k = 0; k < 3; ++k)
+    if (surface.weight[k] > 0.) {
+      Vector change;
+      for (unsigned int d = 0; d < dim; ++d)
+        change[d] = -force * surface.weight[k] * conductance(k, d) * n[d];
+      noted.note(surface.node[k], change);
+    }
+}
+
+template <int dim>
+void ContactPair<dim>::give_flux_reactions(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const
+{
+  if (continuum.is_saturated())
+    noted.add_up(parallel, [&](const std::size_t row, const double change) {
+      continuum.response().flux[row] += change;
+    });
 }
 
 template <int dim>

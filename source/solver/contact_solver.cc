@@ -9,13 +9,14 @@
 
 namespace peat {
 namespace {
+/// Its place in the scene, or no_index.
 template <int dim>
-RigidBody<dim> *find_rigid(const Scene<dim> &scene, const std::string &name)
+std::uint32_t find_rigid(const Scene<dim> &scene, const std::string &name)
 {
-  for (const auto &rigid : scene.rigid_bodies)
-    if (rigid->name() == name)
-      return rigid.get();
-  return nullptr;
+  for (std::uint32_t r = 0; r < scene.rigid_bodies.size(); ++r)
+    if (scene.rigid_bodies[r]->name() == name)
+      return r;
+  return no_index;
 }
 
 template <int dim>
@@ -48,6 +49,7 @@ void ContactSolver<dim>::reinit(const SchemeParameters &scheme, const Grid<dim> 
 {
   scene = &used_scene;
   continua = &used;
+  tried_accelerations.assign(scene->rigid_bodies.size(), {});
   pairs.clear();
   ties.clear();
   tied_pairs.clear();
@@ -63,18 +65,19 @@ void ContactSolver<dim>::reinit(const SchemeParameters &scheme, const Grid<dim> 
   };
 
   for (const auto &contact : scene->contacts) {
-    RigidBody<dim> *rigid_first = find_rigid(*scene, contact.first);
-    RigidBody<dim> *rigid = rigid_first ? rigid_first : find_rigid(*scene, contact.second);
-    if (!rigid)
+    const std::uint32_t rigid_first = find_rigid(*scene, contact.first);
+    const std::uint32_t place = rigid_first != no_index ? rigid_first : find_rigid(*scene, contact.second);
+    if (place == no_index)
       continue;
-    const std::string &partner = rigid_first ? contact.second : contact.first;
+    RigidBody<dim> *rigid = scene->rigid_bodies[place].get();
+    const std::string &partner = rigid_first != no_index ? contact.second : contact.first;
     for (const auto &continuum : *continua)
       if (holds(*scene, *continuum, partner)) {
         const auto names =
             names_of(*continuum, [&](const std::string &name) { return name == rigid->name(); });
-        pairs.push_back(std::make_unique<RigidContact<dim>>(contact, scheme, grid, *scene, *rigid, *continuum,
-                                                            side(*scene, *continuum, partner, names),
-                                                            rigid_first != nullptr));
+        pairs.push_back(std::make_unique<RigidContact<dim>>(
+            contact, scheme, grid, *scene, *rigid, *continuum, side(*scene, *continuum, partner, names),
+            rigid_first != no_index, tried_accelerations[place]));
       }
   }
   for (std::size_t a = 0; a < continua->size(); ++a)
@@ -102,6 +105,7 @@ void ContactSolver<dim>::reinit(const SchemeParameters &scheme, const Grid<dim> 
         }
     }
   communicator = grid.communicator();
+  implicit_pressure = scheme.implicit_pressure;
 }
 
 template <int dim>
@@ -115,13 +119,33 @@ void ContactSolver<dim>::for_each(const Action &action)
 }
 
 template <int dim>
+template <typename Action>
+void ContactSolver<dim>::sweep(const Action &action)
+{
+  // Stopped after any number of turns, the reactions are those of bodies that give way a little: never more
+  // than what holds them together.
+  constexpr unsigned int most_turns = 8;
+  for (unsigned int turn = 0; turn < (needs_sweeps ? most_turns : 1); ++turn) {
+    for_each(action);
+    if (!needs_sweeps)
+      return;
+    for (auto pair = tied_pairs.rbegin(); pair != tied_pairs.rend(); ++pair)
+      action(**pair);
+    for (auto pair = pairs.rbegin(); pair != pairs.rend(); ++pair)
+      action(**pair);
+  }
+}
+
+template <int dim>
 void ContactSolver<dim>::match_nodes()
 {
-  if (pairs.empty() && tied_pairs.empty())
+  if (is_empty())
     return;
   for (const auto &continuum : *continua) {
     continuum->fields().contact_force.assign(continuum->nodes().size() * dim, 0.);
     continuum->find_prescribed_rows();
+    if (implicit_pressure)
+      continuum->couple_nodes();
   }
   for_each([](auto &pair) { pair.match_nodes(); });
 
@@ -141,31 +165,36 @@ void ContactSolver<dim>::match_nodes()
 }
 
 template <int dim>
-void ContactSolver<dim>::solve(const double time, const double dt, Ledger<dim> &book)
+void ContactSolver<dim>::begin(const double step_begin, const double step_length)
 {
-  if (pairs.empty() && tied_pairs.empty() && scene->rigid_bodies.empty())
-    return;
-  if (!pairs.empty() || !tied_pairs.empty())
+  time = step_begin;
+  dt = step_length;
+  largest_change = 0.;
+  if (!is_empty())
     for (const auto &continuum : *continua) {
       auto &force = continuum->fields().contact_force;
       std::fill(force.begin(), force.end(), 0.);
     }
   for_each([&](auto &pair) { pair.begin(dt); });
-  const auto &gravity = continua->front()->gravity();
-  std::vector<dealii::Tensor<1, dim>> start;
+  start.clear();
   for (const auto &rigid : scene->rigid_bodies) {
     start.push_back(rigid->velocity());
     rigid->last_force = {};
     rigid->last_moment = {};
-    rigid->begin_step(time, dt, gravity);
+    rigid->begin_step(time, dt, continua->front()->gravity());
   }
+}
 
+template <int dim>
+void ContactSolver<dim>::solve()
+{
   constexpr unsigned int most_sweeps = 100;
   constexpr double tolerance = 1e-12;
   double first_change = 0.;
   for (unsigned int sweep = 0; sweep < most_sweeps; ++sweep) {
     double change = 0.;
     for_each([&](auto &pair) { change = std::max(change, pair.solve()); });
+    largest_change = std::max(largest_change, change);
     if (!needs_sweeps)
       break;
     change = dealii::Utilities::MPI::max(change, communicator);
@@ -173,10 +202,64 @@ void ContactSolver<dim>::solve(const double time, const double dt, Ledger<dim> &
     if (change <= tolerance * first_change)
       break;
   }
+}
+
+template <int dim>
+void ContactSolver<dim>::hold()
+{
+  if (is_empty())
+    return;
+  for (const auto &continuum : *continua) {
+    auto &held = continuum->response().held;
+    std::fill(held.begin(), held.end(), 0);
+  }
+  for_each([](auto &pair) { pair.hold(); });
+}
+
+template <int dim>
+void ContactSolver<dim>::restrain()
+{
+  for (const auto &continuum : *continua)
+    if (!continuum->is_saturated()) {
+      auto &acceleration = continuum->response().acceleration;
+      std::fill(acceleration.begin(), acceleration.end(), 0.);
+    }
+  std::fill(tried_accelerations.begin(), tried_accelerations.end(), typename RigidBody<dim>::Generalised());
+  // Equations (53) and (54) of theory.md.
+  for_each([](auto &pair) { pair.forget_reactions(); });
+  sweep([](auto &pair) { pair.restrain_motion(); });
+  sweep([](auto &pair) { pair.restrain_flux(); });
+}
+
+template <int dim>
+void ContactSolver<dim>::take_reactions()
+{
+  for_each([](auto &pair) { pair.take_reactions(); });
+}
+
+template <int dim>
+bool ContactSolver<dim>::is_outdated()
+{
+  // Of the largest change in the step: so much may be left to the next one.
+  constexpr double negligible = 1e-4;
+  if (is_empty())
+    return false;
+  double change = 0.;
+  for_each([&](auto &pair) { change = std::max(change, pair.outdated_change()); });
+  const std::vector<double> mine = {change, largest_change};
+  std::vector<double> all(2);
+  dealii::Utilities::MPI::max(mine, communicator, all);
+  return all[0] > negligible * all[1];
+}
+
+template <int dim>
+void ContactSolver<dim>::finish(Ledger<dim> &book)
+{
   for_each([&](auto &pair) { pair.finish(book); });
   for (const auto &pair : pairs)
     scene->contact_states[pair->name()] = pair->state();
 
+  const auto &gravity = continua->front()->gravity();
   const bool first_rank = dealii::Utilities::MPI::this_mpi_process(communicator) == 0;
   for (std::size_t r = 0; r < scene->rigid_bodies.size(); ++r) {
     RigidBody<dim> &rigid = *scene->rigid_bodies[r];

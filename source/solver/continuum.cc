@@ -33,11 +33,11 @@ Continuum<dim>::Continuum(const SchemeParameters &scheme, const Grid<dim> &grid,
     }
   has_loads = has_loads || !surfaces.empty();
   if (scheme.implicit_pressure && saturated)
-    begin_implicit_pressure();
+    make_implicit_pressure();
 }
 
 template <int dim>
-void Continuum<dim>::begin_implicit_pressure()
+void Continuum<dim>::make_implicit_pressure()
 {
   double alpha = 0.;
   for (std::size_t b = 0; b < members.size(); ++b)
@@ -52,8 +52,8 @@ void Continuum<dim>::begin_implicit_pressure()
     constrains_flux =
         constrains_flux || condition->fluid() == Fluid::flux || condition->fluid() == Fluid::impermeable;
   }
-  pressure = std::make_unique<ImplicitPressure<dim>>(
-      active, alpha, scheme.seepage_inertia, scheme.pressure_stabilisation, scheme.pressure_tolerance);
+  pressure = std::make_unique<ImplicitPressure<dim>>(active, tried, alpha, scheme.seepage_inertia,
+                                                     scheme.pressure_stabilisation);
   first_increment.resize(members.size());
 }
 
@@ -387,7 +387,18 @@ void Continuum<dim>::find_freedom()
 }
 
 template <int dim>
-void Continuum<dim>::solve_pressure()
+void Continuum<dim>::couple_nodes()
+{
+  tried.acceleration.assign(active.size() * dim, 0.);
+  if (!pressure)
+    return;
+  tried.flux.assign(active.size() * dim, 0.);
+  tried.conductance.assign(active.size() * dim, 0.);
+  tried.held.assign(active.size() * dim, 0);
+}
+
+template <int dim>
+void Continuum<dim>::begin_pressure()
 {
   if (!pressure)
     return;
@@ -395,7 +406,28 @@ void Continuum<dim>::solve_pressure()
   last_squeezed = pressure->fluid_squeezed();
   if (constrains_flux)
     find_freedom();
-  pressure->solve(freedom, gravity_now, nodal);
+  pressure->begin();
+}
+
+template <int dim>
+void Continuum<dim>::prepare_pressure()
+{
+  if (pressure)
+    pressure->prepare(freedom, gravity_now, nodal);
+}
+
+template <int dim>
+void Continuum<dim>::take_pressure()
+{
+  if (pressure)
+    pressure->update(nodal);
+}
+
+template <int dim>
+void Continuum<dim>::finish_pressure()
+{
+  if (pressure)
+    pressure->finish(nodal);
 }
 
 template <int dim>

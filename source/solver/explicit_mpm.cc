@@ -68,6 +68,12 @@ ExplicitMPM<dim>::ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &g
   if (!scene.contacts.empty())
     all_nodes = std::make_unique<ActiveNodes<dim>>(grid, static_cast<unsigned int>(scheme.basis));
   contact.reinit(scheme, grid, scene, continua);
+  std::vector<ImplicitPressure<dim> *> implicit;
+  for (const auto &continuum : continua)
+    if (ImplicitPressure<dim> *pressure = continuum->implicit_pressure())
+      implicit.push_back(pressure);
+  pressures.reinit(std::move(implicit), contact.is_empty() ? nullptr : &contact, scheme.pressure_tolerance,
+                   grid.communicator());
 }
 
 template <int dim>
@@ -95,6 +101,39 @@ void ExplicitMPM<dim>::prepare()
 }
 
 template <int dim>
+void ExplicitMPM<dim>::find_flux()
+{
+  for (const auto &continuum : continua)
+    continuum->solve_darcy();
+  contact.constrain_flux();
+}
+
+template <int dim>
+void ExplicitMPM<dim>::solve_pressure()
+{
+  // Pressures change what bodies in contact do to each other; mostly they stay as they are, some part or
+  // begin to slide.
+  constexpr unsigned int most_passes = 6;
+  const auto each = [&](const auto &stage) {
+    for (const auto &continuum : continua)
+      stage(*continuum);
+  };
+  each([](auto &continuum) { continuum.begin_pressure(); });
+  for (unsigned int pass = 1;; ++pass) {
+    contact.hold();
+    each([](auto &continuum) { continuum.prepare_pressure(); });
+    pressures.solve();
+    each([](auto &continuum) { continuum.take_pressure(); });
+    contact.take_reactions();
+    if (pass == most_passes || !contact.is_outdated())
+      break;
+    contact.solve();
+    find_flux();
+  }
+  each([](auto &continuum) { continuum.finish_pressure(); });
+}
+
+template <int dim>
 void ExplicitMPM<dim>::step(const double dt)
 {
   const auto each = [&](const auto &stage) {
@@ -106,10 +145,12 @@ void ExplicitMPM<dim>::step(const double dt)
   each([&](auto &continuum) { continuum.find_velocities(); });
   each([&](auto &continuum) { continuum.solve_momentum(); });
   each([&](auto &continuum) { continuum.constrain_motion(book); });
-  contact.solve(now, dt, book);
-  each([&](auto &continuum) { continuum.solve_darcy(); });
-  contact.constrain_flux();
-  each([&](auto &continuum) { continuum.solve_pressure(); });
+  contact.begin(now, dt);
+  contact.solve();
+  find_flux();
+  if (!pressures.is_empty())
+    solve_pressure();
+  contact.finish(book);
   each([&](auto &continuum) { continuum.advance_points(); });
   contact.constrain_carrying_velocity();
   each([&](auto &continuum) { continuum.deform_points(); });
@@ -117,19 +158,6 @@ void ExplicitMPM<dim>::step(const double dt)
   each([&](auto &continuum) { continuum.move_tracers(); });
   now += dt;
   relocate_points();
-}
-
-template <int dim>
-PressureWork ExplicitMPM<dim>::pressure_work() const
-{
-  PressureWork sum;
-  for (const auto &continuum : continua)
-    if (const auto *pressure = continuum->implicit_pressure()) {
-      sum.solves += pressure->work().solves;
-      sum.iterations += pressure->work().iterations;
-      sum.multigrids += pressure->work().multigrids;
-    }
-  return sum;
 }
 
 template <int dim>

@@ -1,7 +1,5 @@
 #include <peat/solver/implicit_pressure.h>
 
-#include <peat/base/error.h>
-
 #include <deal.II/base/mpi.h>
 #include <deal.II/lac/trilinos_sparsity_pattern.h>
 
@@ -9,23 +7,21 @@
 #include <ml_MultiLevelPreconditioner.h>
 
 #include <cmath>
-#include <sstream>
 
 namespace peat {
 namespace {
 /// With more iterations than these the diagonal alone is a poor preconditioner.
 constexpr unsigned int most_with_diagonal = 25;
-constexpr unsigned int most_iterations = 2000;
 /// Mid-step velocity: new velocity minus this times dt a.
 constexpr double half = 0.5;
 } // namespace
 
 template <int dim>
-ImplicitPressure<dim>::ImplicitPressure(const ActiveNodes<dim> &active, const double alpha,
-                                        const bool seepage_inertia, const double stabilisation,
-                                        const double tolerance)
-    : active(active), alpha(alpha), seepage_inertia(seepage_inertia), stabilisation(stabilisation),
-      tolerance(tolerance), communicator(active.grid().communicator())
+ImplicitPressure<dim>::ImplicitPressure(const ActiveNodes<dim> &active, NodalResponse &response,
+                                        const double alpha, const bool seepage_inertia,
+                                        const double stabilisation)
+    : active(active), response(response), alpha(alpha), seepage_inertia(seepage_inertia),
+      stabilisation(stabilisation), communicator(active.grid().communicator())
 {}
 
 template <int dim>
@@ -91,10 +87,8 @@ void ImplicitPressure<dim>::find_responses(const NodeFreedom<dim> &freedom, cons
   const std::size_t n = active.size();
   mobility.resize(n * dim);
   conductance.resize(n * dim);
-  response.resize(n * dim);
-  mode_response.assign(n * n_modes, 0.);
+  yield.resize(n * dim);
   q.resize(n * dim);
-  mode.resize(n * n_modes);
   const double inertia = seepage_inertia ? 1. : 0.;
   for (std::size_t i = 0; i < n; ++i) {
     const double *sum = &nodal.sums[i * nodal.n_sums];
@@ -102,9 +96,11 @@ void ImplicitPressure<dim>::find_responses(const NodeFreedom<dim> &freedom, cons
     for (unsigned int d = 0; d < dim; ++d) {
       const std::size_t row = i * dim + d;
       mobility[row] = sum[S::mass] > 0. && freedom.moves[row] ? weight * alpha / sum[S::mass] : 0.;
+      // What holds a node bears the force on it. That is the other extreme, but Y is small where it matters.
+      const double free_motion = response.held.empty() || !response.held[row] ? mobility[row] / weight : 0.;
       conductance[row] =
-          freedom.flows[row] ? flow * (1. - inertia * sum[S::fluid_inertia] * mobility[row] / weight) : 0.;
-      response[row] = dt * dt * half * alpha * mobility[row] + dt * conductance[row];
+          freedom.flows[row] ? flow * (1. - inertia * sum[S::fluid_inertia] * free_motion) : 0.;
+      yield[row] = dt * dt * half * alpha * mobility[row] + dt * conductance[row];
     }
   }
   walls.clear();
@@ -118,9 +114,19 @@ void ImplicitPressure<dim>::find_responses(const NodeFreedom<dim> &freedom, cons
     for (unsigned int d = 0; d < dim; ++d) {
       const std::size_t row = std::size_t(i) * dim + d;
       conductance[row] = 0.;
-      response[row] = dt * dt * half * alpha * mobility[row];
+      yield[row] = dt * dt * half * alpha * mobility[row];
     }
   }
+  if (!response.conductance.empty())
+    response.conductance = conductance;
+}
+
+template <int dim>
+void ImplicitPressure<dim>::find_mode_responses()
+{
+  const std::size_t n = active.size();
+  mode_response.assign(n * n_modes, 0.);
+  mode.resize(n * n_modes);
   if (stabilisation == 0.)
     return;
   for (std::size_t i = 0; i < n; ++i) {
@@ -130,7 +136,7 @@ void ImplicitPressure<dim>::find_responses(const NodeFreedom<dim> &freedom, cons
     for (unsigned int d = 0; d < dim; ++d) {
       const double h = spacing[i * dim + d];
       volume *= h;
-      along[d] = 4. * response[i * dim + d] / (h * h);
+      along[d] = 4. * yield[i * dim + d] / (h * h);
     }
     for (unsigned int m = 0; m < n_modes; ++m)
       for (unsigned int d = 0; d < dim; ++d)
@@ -146,7 +152,8 @@ void ImplicitPressure<dim>::find_right_side(const dealii::Tensor<1, dim> &gravit
 {
   using S = Sums<dim>;
   // What has to vanish at rest, and what its parts would be if none cancelled another.
-  std::vector<double> carry(active.size() * dim), gross(active.size() * dim);
+  carry.resize(active.size() * dim);
+  gross.resize(active.size() * dim);
   for (std::size_t i = 0; i < active.size(); ++i) {
     const double *sum = &nodal.sums[i * nodal.n_sums];
     const double flow = sum[S::resistance] > 0. ? 1. / sum[S::resistance] : 0.;
@@ -169,18 +176,17 @@ void ImplicitPressure<dim>::find_right_side(const dealii::Tensor<1, dim> &gravit
                  gross[sums.entry_node[e] * std::size_t(dim) + d];
       }
     right_side.local_element(k) = sum;
-    r.local_element(k) = sum - sums.storage[k] * sums.last_increment[k];
-    parts += sums.storage[k] * std::abs(sums.last_increment[k]);
+    r.local_element(k) = sum - sums.storage[k] * x.local_element(k);
+    parts += sums.storage[k] * std::abs(x.local_element(k));
     sum_of_squares += parts * parts / diagonal.local_element(k);
   }
-  std::copy(sums.last_increment.begin(), sums.last_increment.end(), x.begin());
   add_stabilisation(x, -1., r);
   constexpr double relative = 1e-15;
-  round_off = relative * std::sqrt(dealii::Utilities::MPI::sum(sum_of_squares, communicator));
+  round_off = relative * relative * sum_of_squares;
 }
 
 template <int dim>
-void ImplicitPressure<dim>::to_nodes(const Vector &pressures) const
+void ImplicitPressure<dim>::to_nodes(const Vector &pressures)
 {
   std::fill(q.begin(), q.end(), 0.);
   const std::uint32_t *node = sums.entry_node.data();
@@ -197,21 +203,38 @@ void ImplicitPressure<dim>::to_nodes(const Vector &pressures) const
 }
 
 template <int dim>
-void ImplicitPressure<dim>::apply(const Vector &pressures, Vector &result) const
+void ImplicitPressure<dim>::find_accelerations_and_fluxes()
 {
-  to_nodes(pressures);
-  std::vector<dealii::Tensor<1, dim>> through_walls;
-  for (const auto &[i, tensor] : walls) {
-    dealii::Tensor<1, dim> force;
-    for (unsigned int d = 0; d < dim; ++d)
-      force[d] = q[std::size_t(i) * dim + d];
-    through_walls.push_back(dt * (tensor * force));
+  for (std::size_t row = 0; row < q.size(); ++row) {
+    response.acceleration[row] = mobility[row] * q[row];
+    response.flux[row] = conductance[row] * q[row];
   }
-  for (std::size_t row = 0; row < q.size(); ++row)
-    q[row] *= response[row];
-  for (std::size_t w = 0; w < walls.size(); ++w)
+  for (const auto &[i, tensor] : walls)
     for (unsigned int d = 0; d < dim; ++d)
-      q[std::size_t(walls[w].first) * dim + d] += through_walls[w][d];
+      for (unsigned int c = 0; c < dim; ++c)
+        response.flux[std::size_t(i) * dim + d] += tensor[d][c] * q[std::size_t(i) * dim + c];
+}
+
+template <int dim>
+void ImplicitPressure<dim>::apply(const Vector &pressures, Vector &result)
+{
+  // From here on q is G q.
+  if (response.acceleration.empty()) {
+    through_walls.clear();
+    for (const auto &[i, tensor] : walls) {
+      dealii::Tensor<1, dim> force;
+      for (unsigned int d = 0; d < dim; ++d)
+        force[d] = q[std::size_t(i) * dim + d];
+      through_walls.push_back(dt * (tensor * force));
+    }
+    for (std::size_t row = 0; row < q.size(); ++row)
+      q[row] *= yield[row];
+    for (std::size_t w = 0; w < walls.size(); ++w)
+      for (unsigned int d = 0; d < dim; ++d)
+        q[std::size_t(walls[w].first) * dim + d] += through_walls[w][d];
+  } else
+    for (std::size_t row = 0; row < q.size(); ++row)
+      q[row] = dt * (half * dt * alpha * response.acceleration[row] + response.flux[row]);
 
   const std::uint32_t *node = sums.entry_node.data();
   const double *slope = sums.slopes.data();
@@ -277,7 +300,7 @@ void ImplicitPressure<dim>::find_diagonal()
       const std::size_t i = sums.entry_node[e];
       const double *value = &sums.slopes[e * std::size_t(dim)];
       for (unsigned int d = 0; d < dim; ++d)
-        sum += value[d] * value[d] * response[i * dim + d];
+        sum += value[d] * value[d] * yield[i * dim + d];
       if (!walls.empty() && wall_of_node[i] != no_index)
         for (unsigned int d = 0; d < dim; ++d)
           for (unsigned int c = 0; c < dim; ++c)
@@ -318,7 +341,7 @@ void ImplicitPressure<dim>::make_multigrid()
           double volume = 1.;
           for (unsigned int e = 0; e < dim; ++e)
             volume *= spacing[i * dim + e];
-          coupling += response[i * dim + d] * volume * volume * filling[i];
+          coupling += yield[i * dim + d] * volume * volume * filling[i];
         }
       const double h = grid.size(cell_of_unknown[k], d);
       coupling *= 2. / n_corners / (h * h);
@@ -343,7 +366,7 @@ void ImplicitPressure<dim>::make_multigrid()
   multigrid = std::make_unique<dealii::TrilinosWrappers::PreconditionAMG>();
   multigrid->initialize(star, list);
   fresh_iterations = 0;
-  ++done.multigrids;
+  ++multigrids_made;
 }
 
 template <int dim>
@@ -357,63 +380,55 @@ void ImplicitPressure<dim>::precondition(const Vector &residual, Vector &result)
 }
 
 template <int dim>
-unsigned int ImplicitPressure<dim>::iterate()
+double ImplicitPressure<dim>::squared_norm(const Vector &vector) const
 {
-  const auto squared_norm = [&](const Vector &vector) {
-    double sum = 0.;
-    for (std::size_t k = 0; k < sums.storage.size(); ++k)
-      sum += vector.local_element(k) * vector.local_element(k) / diagonal.local_element(k);
-    return dealii::Utilities::MPI::sum(sum, communicator);
-  };
-  // What is looked for is the change of the increment.
-  const double size = std::sqrt(squared_norm(right_side));
-  const double target = std::max(tolerance * size, round_off);
-  change = 0.;
-  double rho_before = 0.;
-  for (unsigned int iteration = 0;; ++iteration) {
-    const double norm = std::sqrt(squared_norm(r));
-    if (norm <= target)
-      return iteration;
-    if (iteration >= most_iterations || !(norm < std::numeric_limits<double>::max())) {
-      std::ostringstream text;
-      text << "the pore pressure of an implicit step did not converge in " << iteration
-           << " iterations: residual " << norm / size
-           << " of the right-hand side; use a smaller 'Step factor'";
-      throw NumericalError(text.str());
-    }
-    precondition(r, z);
-    const double rho = r * z;
-    direction.sadd(iteration > 0 ? rho / rho_before : 0., 1., z);
-    rho_before = rho;
-    apply(direction, image);
-    const double length = rho / (direction * image);
-    change.add(length, direction);
-    r.add(-length, image);
-  }
+  double sum = 0.;
+  for (std::size_t k = 0; k < sums.storage.size(); ++k)
+    sum += vector.local_element(k) * vector.local_element(k) / diagonal.local_element(k);
+  return sum;
+}
+
+template <int dim>
+void ImplicitPressure<dim>::judge_preconditioner(const unsigned int n_iterations)
+{
+  if (!multigrid)
+    wants_multigrid = wants_multigrid || n_iterations > most_with_diagonal;
+  else if (fresh_iterations == 0)
+    fresh_iterations = n_iterations;
+  else if (n_iterations > 2 * fresh_iterations + 5)
+    multigrid.reset();
 }
 
 template <int dim>
 void ImplicitPressure<dim>::update(NodalFields<dim> &nodal)
 {
   using S = Sums<dim>;
-  to_nodes(change);
+  for (std::size_t k = 0; k < sums.storage.size(); ++k)
+    x.local_element(k) += change.local_element(k);
+  const bool coupled = !response.acceleration.empty();
   for (std::size_t i = 0; i < active.size(); ++i) {
     double *sum = &nodal.sums[i * nodal.n_sums];
     for (unsigned int d = 0; d < dim; ++d) {
       const std::size_t row = i * dim + d;
       sum[S::force + d] += weight * alpha * q[row];
       sum[S::pressure_force + d] += weight * q[row];
-      const double change = mobility[row] * q[row];
-      nodal.acceleration[row] += change;
-      nodal.new_velocity[row] += dt * change;
-      nodal.flux[row] += conductance[row] * q[row];
+      const double a = mobility[row] * q[row];
+      nodal.acceleration[row] += a;
+      nodal.new_velocity[row] += dt * a;
+      nodal.flux[row] += coupled ? response.flux[row] : conductance[row] * q[row];
     }
   }
+  if (coupled)
+    return;
   for (const auto &[i, tensor] : walls)
     for (unsigned int d = 0; d < dim; ++d)
       for (unsigned int c = 0; c < dim; ++c)
         nodal.flux[std::size_t(i) * dim + d] += tensor[d][c] * q[std::size_t(i) * dim + c];
+}
 
+template <int dim>
+void ImplicitPressure<dim>::finish(const NodalFields<dim> &nodal)
+{
   outflow = squeezed = 0.;
   for (std::size_t k = 0; k < sums.storage.size(); ++k)
     for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e)
@@ -426,27 +441,22 @@ void ImplicitPressure<dim>::update(NodalFields<dim> &nodal)
 }
 
 template <int dim>
-void ImplicitPressure<dim>::solve(const NodeFreedom<dim> &freedom, const dealii::Tensor<1, dim> &gravity,
-                                  NodalFields<dim> &nodal)
+void ImplicitPressure<dim>::begin()
+{
+  std::copy(sums.last_increment.begin(), sums.last_increment.end(), x.begin());
+}
+
+template <int dim>
+void ImplicitPressure<dim>::prepare(const NodeFreedom<dim> &freedom, const dealii::Tensor<1, dim> &gravity,
+                                    const NodalFields<dim> &nodal)
 {
   dt = nodal.dt;
   find_responses(freedom, nodal);
+  find_mode_responses();
   find_diagonal();
   find_right_side(gravity, nodal);
   if (wants_multigrid && !multigrid)
     make_multigrid();
-  const unsigned int n = iterate();
-  ++done.solves;
-  done.iterations += n;
-  if (!multigrid)
-    wants_multigrid = wants_multigrid || n > most_with_diagonal;
-  else if (fresh_iterations == 0)
-    fresh_iterations = n;
-  else if (n > 2 * fresh_iterations + 5)
-    multigrid.reset();
-  for (std::size_t k = 0; k < sums.storage.size(); ++k)
-    x.local_element(k) = sums.last_increment[k] + change.local_element(k);
-  update(nodal);
 }
 
 template class ImplicitPressure<2>;

@@ -14,6 +14,9 @@ constexpr double renewal = 0.5;
 constexpr double influence = 0.5 + 1e-9;
 /// Points that are less than this farther than the nearest one have a say in a node's normal [cell sizes].
 constexpr double normal_range = 0.25;
+/// By so much the gap of the nearest point may be less than the mean of those near it, and still count [cell
+/// sizes].
+constexpr double gap_slack = 0.015;
 
 template <std::size_t n>
 void add_over_ranks(std::array<double, n> &values, MPI_Comm communicator)
@@ -27,9 +30,9 @@ template <int dim>
 RigidContact<dim>::RigidContact(const ContactParameters<dim> &parameters, const SchemeParameters &scheme,
                                 const Grid<dim> &grid, const Scene<dim> &scene, RigidBody<dim> &rigid,
                                 Continuum<dim> &continuum, std::vector<std::size_t> bodies,
-                                const bool rigid_is_first)
+                                const bool rigid_is_first, Generalised &tried_acceleration)
     : ContactPair<dim>(parameters, scheme, grid, scene), rigid(rigid), continuum(continuum),
-      bodies(std::move(bodies)), sign(rigid_is_first ? 1. : -1.)
+      bodies(std::move(bodies)), sign(rigid_is_first ? 1. : -1.), tried_acceleration(tried_acceleration)
 {
   this->alpha = ContactPair<dim>::biot_coefficient(continuum, scene);
 }
@@ -102,6 +105,7 @@ void RigidContact<dim>::begin(const double dt)
   find_surfaces();
   for (ContactSite<dim> &site : sites) {
     site.impulse = Vector();
+    site.mode = ContactMode::open;
     if (site.acts)
       site.relative_velocity =
           rigid.velocity_at(site.x) - this->velocity(continuum.fields().velocity, site.second_surface);
@@ -151,6 +155,7 @@ void RigidContact<dim>::find_gaps()
       sum[1 + d] += w * n[d];
       sum[1 + dim + d] += w * (point.x[d] - distances[entry.point] * n[d]);
     }
+    sum[1 + 3 * dim] += w * gap;
   }
   if (this->parallel)
     nodes.sum_over_ranks(sums.data(), n_columns);
@@ -167,7 +172,10 @@ void RigidContact<dim>::find_gaps()
     if (site.normal.norm() == 0.)
       continue;
     site.normal /= site.normal.norm();
-    site.gap = -nearest[index_of(site)];
+    // The least gap of all points that reach the node would be that of a surface which is in contact beside
+    // it: a wheel would be held by the ground ahead of it. Within the slack it counts, as of flat surfaces.
+    const double least = -nearest[index_of(site)], mean = sum[1 + 3 * dim] / sum[0];
+    site.gap = least + std::max(0., mean - least - gap_slack * this->grid.smallest_cell_size());
   }
 }
 
@@ -214,7 +222,7 @@ void RigidContact<dim>::respond_to(const Generalised &motion)
     auto fluid = this->fluid_force(continuum, site.second_surface, -site.normal, site.area);
     fluid.first -= fluid.second * (site.impulse * site.normal);
     const Response response = responses[s] = this->respond(site, relative, compliance, fluid);
-    if (response.kind == Response::Kind::open)
+    if (response.mode == ContactMode::open)
       continue;
     const Generalised push = rigid.wrench(response.impulse, site.x);
     double normal_compliance = 0.;
@@ -226,7 +234,7 @@ void RigidContact<dim>::respond_to(const Generalised &motion)
       unit[j] = 1.;
       const Vector v = rigid.velocity_at(site.x, unit);
       Vector change = (v * site.normal) / normal_compliance * site.normal;
-      if (response.kind == Response::Kind::sticks) {
+      if (response.mode == ContactMode::sticks) {
         for (unsigned int d = 0; d < dim; ++d)
           change[d] = compliance[d] > 0. ? v[d] / compliance[d] : 0.;
       } else
@@ -289,6 +297,21 @@ void RigidContact<dim>::find_motion()
 }
 
 template <int dim>
+typename RigidContact<dim>::Generalised RigidContact<dim>::over_ranks(const Generalised &mine) const
+{
+  if (!this->parallel)
+    return mine;
+  std::array<double, n_motions> values;
+  for (unsigned int i = 0; i < n_motions; ++i)
+    values[i] = mine[i];
+  add_over_ranks(values, this->communicator);
+  Generalised sum;
+  for (unsigned int i = 0; i < n_motions; ++i)
+    sum[i] = values[i];
+  return sum;
+}
+
+template <int dim>
 double RigidContact<dim>::solve()
 {
   if (!this->parallel && sites.empty())
@@ -298,6 +321,7 @@ double RigidContact<dim>::solve()
   Generalised reaction;
   for (std::size_t s = 0; s < sites.size(); ++s) {
     ContactSite<dim> &site = sites[s];
+    site.mode = this->kept_mode(responses[s]);
     const Vector change = responses[s].impulse - site.impulse;
     if (change.norm_square() == 0.)
       continue;
@@ -309,17 +333,134 @@ double RigidContact<dim>::solve()
       largest = std::max(largest, compliance[d] * std::abs(change[d]));
   }
   this->give_impulses(continuum, noted);
-  if (this->parallel) {
-    std::array<double, n_motions> values;
-    for (unsigned int i = 0; i < n_motions; ++i)
-      values[i] = reaction[i];
-    add_over_ranks(values, this->communicator);
-    for (unsigned int i = 0; i < n_motions; ++i)
-      reaction[i] = values[i];
-  }
+  reaction = over_ranks(reaction);
   if (reaction.norm_square() > 0.)
     rigid.add_impulse(reaction);
   return largest;
+}
+
+template <int dim>
+double RigidContact<dim>::outdated_change()
+{
+  if (!this->parallel && sites.empty())
+    return 0.;
+  respond_to(rigid.motion());
+  double largest = 0.;
+  for (std::size_t s = 0; s < sites.size(); ++s) {
+    const ContactSite<dim> &site = sites[s];
+    if (!site.counts || !site.acts)
+      continue;
+    const Vector compliance = this->compliance(continuum, site.second_surface);
+    for (unsigned int d = 0; d < dim; ++d)
+      largest = std::max(largest, compliance[d] * std::abs(responses[s].impulse[d] - site.impulse[d]));
+  }
+  return largest;
+}
+
+template <int dim>
+void RigidContact<dim>::hold()
+{
+  held_sites.clear();
+  for (std::uint32_t s = 0; s < sites.size(); ++s) {
+    const ContactSite<dim> &site = sites[s];
+    if (!site.counts || !site.acts || site.mode == ContactMode::open)
+      continue;
+    ContactPair<dim>::hold(s, this->compliance(continuum, site.second_surface));
+    this->note_held_nodes(site, continuum, site.second_surface, noted);
+  }
+  this->mark_held_nodes(continuum, noted);
+  if (!rigid.is_prescribed())
+    find_common_mobility();
+}
+
+template <int dim>
+void RigidContact<dim>::find_common_mobility()
+{
+  // A wrench f accelerates by b, and the sites, whose surfaces take part in the motion, react with -S b:
+  // b = M^-1 (f - S b).
+  slope.assign(n_motions * n_motions, 0.);
+  for (const std::uint32_t s : held_sites) {
+    const ContactSite<dim> &site = sites[s];
+    for (unsigned int j = 0; j < n_motions; ++j) {
+      Generalised unit;
+      unit[j] = 1.;
+      const Generalised column = rigid.wrench(this->reaction(site, rigid.velocity_at(site.x, unit)), site.x);
+      for (unsigned int i = 0; i < n_motions; ++i)
+        slope[i * n_motions + j] += column[i];
+    }
+  }
+  if (this->parallel)
+    dealii::Utilities::MPI::sum(slope, this->communicator, slope);
+  using Matrix = Eigen::Matrix<double, n_motions, n_motions>;
+  using Column = Eigen::Matrix<double, n_motions, 1>;
+  const auto inverse_mass = rigid.inverse_mass();
+  Matrix system;
+  for (unsigned int i = 0; i < n_motions; ++i)
+    for (unsigned int j = 0; j < n_motions; ++j) {
+      system(i, j) = i == j;
+      for (unsigned int k = 0; k < n_motions; ++k)
+        system(i, j) += inverse_mass[i][k] * slope[k * n_motions + j];
+    }
+  const auto factors = system.partialPivLu();
+  for (unsigned int j = 0; j < n_motions; ++j) {
+    Column unit;
+    for (unsigned int i = 0; i < n_motions; ++i)
+      unit(i) = inverse_mass[i][j];
+    const Column answer = factors.solve(unit);
+    for (unsigned int i = 0; i < n_motions; ++i)
+      common_mobility[i][j] = answer(i);
+  }
+}
+
+template <int dim>
+void RigidContact<dim>::restrain_motion()
+{
+  const auto &accelerations = continuum.response().acceleration;
+  if (!rigid.is_prescribed()) {
+    Generalised wrench;
+    for (const std::uint32_t s : held_sites) {
+      const ContactSite<dim> &site = sites[s];
+      const Vector relative =
+          rigid.velocity_at(site.x, tried_acceleration) - this->velocity(accelerations, site.second_surface);
+      wrench -= rigid.wrench(this->reaction(site, relative), site.x);
+    }
+    tried_acceleration += common_mobility * over_ranks(wrench);
+  }
+  for (const std::uint32_t s : held_sites) {
+    ContactSite<dim> &site = sites[s];
+    const Vector relative =
+        rigid.velocity_at(site.x, tried_acceleration) - this->velocity(accelerations, site.second_surface);
+    const Vector force = this->reaction(site, relative);
+    site.reaction += force;
+    this->push(noted, site.second_surface, force);
+  }
+  this->give_reactions(continuum, noted);
+}
+
+template <int dim>
+void RigidContact<dim>::restrain_flux()
+{
+  for (const std::uint32_t s : held_sites)
+    if (const ContactSite<dim> &site = sites[s]; site.closes_flux)
+      this->note_flux_reaction(continuum, site.second_surface, -site.normal, noted);
+  this->give_flux_reactions(continuum, noted);
+}
+
+template <int dim>
+void RigidContact<dim>::take_reactions()
+{
+  Generalised reaction;
+  for (const std::uint32_t s : held_sites) {
+    ContactSite<dim> &site = sites[s];
+    const Vector impulse = this->step_length * site.reaction;
+    site.impulse += impulse;
+    this->push(noted, site.second_surface, impulse);
+    reaction -= rigid.wrench(impulse, site.x);
+  }
+  this->give_impulses(continuum, noted);
+  reaction = over_ranks(reaction);
+  if (reaction.norm_square() > 0.)
+    rigid.add_impulse(reaction);
 }
 
 template <int dim>

@@ -17,6 +17,11 @@ public:
   void match_nodes() override;
   void begin(double dt) override;
   double solve() override;
+  double outdated_change() override;
+  void hold() override;
+  void restrain_motion() override;
+  void restrain_flux() override;
+  void take_reactions() override;
   void finish(Ledger<dim> &book) override;
   void mark_nodes(const Continuum<dim> &continuum, std::vector<char> &count) const override;
   void constrain_flux() override;
@@ -24,11 +29,17 @@ public:
 
 private:
   using Vector = typename ContactPair<dim>::Vector;
+  using Response = typename ContactPair<dim>::Response;
   using ContactPair<dim>::sites;
+  using ContactPair<dim>::held_sites;
 
   void find_normals();
   void find_gaps();
   void find_surfaces();
+  /// Of both surfaces.
+  Vector compliance_of(const ContactSite<dim> &site) const;
+  /// The impulse that the law allows, given the velocities with that which has acted.
+  Response respond_at(const ContactSite<dim> &site, const Vector &compliance) const;
   /// Of bodies that are tied.
   void take_all_nodes();
   /// Replace values of sites by their sums (or largest values) over ranks; `side` says whose nodes know them.

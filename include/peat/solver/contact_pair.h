@@ -15,6 +15,9 @@ struct SurfaceNodes
   std::array<double, 3> weight = {0., 0., 0.};
 };
 
+/// What surfaces do at a site: they are free, keep their distance, or move as one.
+enum class ContactMode { open, slides, sticks };
+
 /// A place at which two bodies may touch.
 template <int dim>
 struct ContactSite
@@ -35,13 +38,24 @@ struct ContactSite
   double height = 0.;                       ///< of the interface above the nearest node, along the normal [m]
   dealii::Tensor<1, dim> impulse;           ///< of this step, on the second body [N s]
   dealii::Tensor<1, dim> relative_velocity; ///< of the first body, at the start of the step [m/s]
+  ContactMode mode = ContactMode::open;     ///< in which the impulse was found
+
+  // While pore pressures are solved for.
+  double normal_mass = 0.;         ///< force over relative acceleration along the normal [kg]
+  dealii::Tensor<1, dim> mass;     ///< the same in each direction; where the bodies move as one
+  bool closes_flux = false;        ///< no fluid passes
+  dealii::Tensor<1, dim> reaction; ///< to what is tried, on the second body [N]
 };
 
 /// The contact of two bodies during a step: where they may touch, and impulses that keep them from
 /// overlapping and from sliding as far as the law says (theory.md, contact).
 ///
-/// A step calls begin(), then solve() until several contacts agree, then finish() and the constraints. All
-/// are collective.
+/// A step calls begin(), then solve() until several contacts agree, constrain_flux(), then finish() and
+/// constrain_carrying_velocity(). All are collective.
+///
+/// With implicit pore pressures all sites stay in their mode while the pressures are solved for, and hold()
+/// says which these are. What changes of the pressure do to the nodes of both bodies is then restrained so
+/// that surfaces in contact neither approach nor part, nor slide where they stick.
 template <int dim>
 class ContactPair
 {
@@ -56,6 +70,21 @@ public:
   virtual void begin(double dt) = 0;
   /// Find the impulses, given those of the other contacts. Returns the largest change of a velocity [m/s].
   virtual double solve() = 0;
+  /// The largest change of a velocity [m/s] that solve() would bring now, on this rank.
+  virtual double outdated_change() = 0;
+
+  /// The sites are now as they will be while pressures are solved for.
+  virtual void hold() = 0;
+  /// Forget the reactions of what was tried before.
+  void forget_reactions();
+  /// Change the accelerations in the continua's responses, and of free rigid bodies, by the reactions of the
+  /// sites, given those of the other contacts.
+  virtual void restrain_motion() = 0;
+  /// The same with the fluxes.
+  virtual void restrain_flux() = 0;
+  /// The reactions of what was tried last act through the step.
+  virtual void take_reactions() = 0;
+
   /// Sum up what the step did.
   virtual void finish(Ledger<dim> &book) = 0;
   /// Nodes that more than one contact acts on need several sweeps; whether this one acts on the node.
@@ -76,7 +105,8 @@ protected:
   struct Response
   {
     Vector impulse;
-    enum class Kind { open, sticks, slides } kind = Kind::open;
+    ContactMode mode = ContactMode::open;
+    bool bears_shear = false; ///< sticks, and not for want of anything that would make it slide
     Vector slip_direction;
     double slip_ratio = 0.; ///< d(shear impulse) / d(normal impulse)
   };
@@ -115,6 +145,23 @@ protected:
   void note_flux(const Continuum<dim> &continuum, const SurfaceNodes &surface, const Vector &n, double area,
                  NodalAdditions<dim> &noted) const;
   void change_carrying_velocity(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
+  /// What is to be kept of a response for the rest of the step: its mode, for pressures without that of
+  /// surfaces that have no friction and do not slide only because nothing pulls.
+  static ContactMode kept_mode(const Response &response);
+
+  /// Note the site among those that are held, and what mass resists there.
+  void hold(std::uint32_t site, const Vector &compliance);
+  /// The nodes of a surface are held in their motion: by sticking, or because the fluid may leave.
+  void note_held_nodes(const ContactSite<dim> &site, const Continuum<dim> &continuum,
+                       const SurfaceNodes &surface, NodalAdditions<dim> &noted) const;
+  void mark_held_nodes(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
+  /// The force that keeps surfaces from moving with this acceleration, as far as the site's mode says.
+  Vector reaction(const ContactSite<dim> &site, const Vector &relative) const;
+  void give_reactions(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
+  /// The change of the flux that an impermeable interface with normal n out of the continuum makes.
+  void note_flux_reaction(const Continuum<dim> &continuum, const SurfaceNodes &surface, const Vector &n,
+                          NodalAdditions<dim> &noted) const;
+  void give_flux_reactions(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
   void change_flux(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
   /// Biot's coefficient of the continuum's first saturated body.
   static double biot_coefficient(const Continuum<dim> &continuum, const Scene<dim> &scene);
@@ -131,6 +178,7 @@ protected:
   double alpha = 1.; ///< Biot's coefficient of the saturated side
 
   std::vector<ContactSite<dim>> sites;
+  std::vector<std::uint32_t> held_sites; ///< of those that this rank handles
 
 private:
   std::vector<std::uint32_t> owner_of_site; ///< the site whose line it is on

@@ -33,8 +33,12 @@ public:
   void solve_momentum();
   void constrain_motion(Ledger<dim> &book);
   void solve_darcy();
-  /// Implicit pressures: their increments, and what they do to motion and flux.
-  void solve_pressure();
+  // Implicit pressures: begin, prepare and take once or more often, finish. In between PressureSystem solves.
+  void begin_pressure();
+  void prepare_pressure();
+  /// What the pressure does to motion and flux.
+  void take_pressure();
+  void finish_pressure();
   /// Velocities of the points; with modified-update-stress-last mapped back to the nodes:
   /// carrying_velocity().
   void advance_points();
@@ -50,7 +54,12 @@ public:
   const dealii::Tensor<1, dim> &gravity() const { return gravity_now; }
   const StepFindings &findings() const { return step_findings; }
   /// Nullptr with explicit pressures and in dry continua.
-  const ImplicitPressure<dim> *implicit_pressure() const { return pressure.get(); }
+  ImplicitPressure<dim> *implicit_pressure() const { return pressure.get(); }
+  /// What a change of pressures that is tried does to the nodes; empty where it concerns these alone.
+  NodalResponse &response() { return tried; }
+  const NodalResponse &response() const { return tried; }
+  /// From now on other things are coupled with the nodes.
+  void couple_nodes();
 
   double mass(const std::size_t node) const { return nodal.sums[node * nodal.n_sums + Sums<dim>::mass]; }
   /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
@@ -69,7 +78,7 @@ private:
   double node_volume(std::size_t node) const;
   dealii::Tensor<1, dim> total_momentum() const;
   PressureUpdate pressure_update(std::size_t member) const;
-  void begin_implicit_pressure();
+  void make_implicit_pressure();
   /// Increments of the pressure from the middle of a step on to its end. The first step begins at a full
   /// level of time, and the middle is that of both ends.
   double extrapolation() const { return last_dt > 0. ? 1.5 : 1.; }
@@ -103,6 +112,7 @@ private:
   dealii::Tensor<1, dim> gravity_now;
   StepFindings step_findings;
 
+  NodalResponse tried;
   std::unique_ptr<ImplicitPressure<dim>> pressure;
   std::vector<std::size_t> first_increment; ///< of the member's cells
   NodeFreedom<dim> freedom;

@@ -2,6 +2,7 @@
 
 #include <peat/solver/contact_solver.h>
 #include <peat/solver/continuum.h>
+#include <peat/solver/pressure_system.h>
 #include <peat/solver/solver.h>
 #include <peat/solver/time_step.h>
 
@@ -26,13 +27,16 @@ public:
   double time() const override { return now; }
   void set_time(const double time) override { now = time; }
   /// Of this stage; all zero with explicit pressures.
-  PressureWork pressure_work() const;
+  PressureWork pressure_work() const { return pressures.work(); }
   /// Of all bodies together.
   const ActiveNodes<dim> &nodes() const override;
   const NodalFields<dim> &fields() const override;
   const Ledger<dim> &ledger() const override { return book; }
 
 private:
+  void find_flux();
+  /// Implicit pressures, with what bodies in contact make of them.
+  void solve_pressure();
   void relocate_points();
   void gather_flux() const;
 
@@ -41,6 +45,7 @@ private:
   Scene<dim> &scene;
   std::vector<std::unique_ptr<Continuum<dim>>> continua;
   ContactSolver<dim> contact;
+  PressureSystem<dim> pressures;
   /// Where there are contacts: the nodes of all, and what pictures ask for on them.
   std::unique_ptr<ActiveNodes<dim>> all_nodes;
   mutable NodalFields<dim> all_fields;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <peat/condition/nodal_fields.h>
+#include <peat/solver/nodal_coupling.h>
 #include <peat/transfer/kernels.h>
 
 #include <deal.II/base/tensor.h>
@@ -12,13 +13,8 @@
 #include <vector>
 
 namespace peat {
-/// What implicit pressures cost so far.
-struct PressureWork
-{
-  unsigned long solves = 0;
-  unsigned long iterations = 0;
-  unsigned long multigrids = 0; ///< preconditioners made
-};
+template <int dim>
+class PressureSystem;
 
 /// How a node answers to the pore pressure: which components may move and flow.
 template <int dim>
@@ -30,17 +26,18 @@ struct NodeFreedom
   std::vector<std::pair<std::uint32_t, dealii::Tensor<2, dim>>> walls;
 };
 
-/// The pore pressure of a semi-implicit step: one unknown per cell and body, the change Y of its increment X
-/// against that of the last step, from
+/// The pore pressure of a continuum in a semi-implicit step: one unknown per cell and body, the change Y of
+/// its increment X against that of the last step, from
 ///
 ///   (S + B^T G B + C) Y = - dt B^T (alpha v_m + w) - (S + C) X_last,   B = sum V grad N,  S = sum V/Q,
 ///
-/// where v_m and w are mid-step velocity and flux as an explicit step would have them, and C is the
-/// stabilisation (theory.md, implicit pore pressure). Symmetric and positive definite; solved by conjugate
-/// gradients, with the diagonal, or with algebraic multigrid on a star of 2 dim + 1 points, as
-/// preconditioner.
+/// where v_m and w are mid-step velocity and flux as an explicit step would have them, G what nodes make of
+/// forces, alone or coupled with others, and C is the stabilisation (theory.md, implicit pore pressure).
+/// Symmetric and positive definite. PressureSystem solves it, for all continua together; the preconditioner
+/// is the diagonal, or algebraic multigrid on a star of 2 dim + 1 points.
 ///
-/// Collective: all functions that a step calls.
+/// A step calls begin(), then prepare() and, when the change is found, update() once or more often, then
+/// finish(). Collective: all functions that a step calls.
 template <int dim>
 class ImplicitPressure
 {
@@ -49,26 +46,33 @@ public:
   /// the second difference in time, which damps what steps do not resolve.
   static constexpr double weight = 0.5 + 1. / 16.;
 
+  /// @param response of the continuum's nodes; empty: nodes are not coupled with others
   /// @param stabilisation factor on the term that acts on alternating pressures
-  /// @param tolerance residual over right-hand side, in the norm of the inverse diagonal
-  ImplicitPressure(const ActiveNodes<dim> &active, double alpha, bool seepage_inertia, double stabilisation,
-                   double tolerance);
+  ImplicitPressure(const ActiveNodes<dim> &active, NodalResponse &response, double alpha,
+                   bool seepage_inertia, double stabilisation);
 
   /// Number the unknowns, one for each of these cells, in the order of the sums.
   void renumber(const std::vector<CellId> &cells);
 
-  /// Find the increments, and add what they do to acceleration, new velocity, flux and the sums of forces.
-  /// Throws NumericalError on every rank if they do not converge.
-  void solve(const NodeFreedom<dim> &freedom, const dealii::Tensor<1, dim> &gravity, NodalFields<dim> &nodal);
+  /// The increments are those of the last step.
+  void begin();
+  /// Make the system for a change of the increments, from the fields as they are.
+  void prepare(const NodeFreedom<dim> &freedom, const dealii::Tensor<1, dim> &gravity,
+               const NodalFields<dim> &nodal);
+  /// Add what the change does to acceleration, new velocity, flux and the sums of forces. Of accelerations
+  /// and velocities that is what nodes do alone: whatever couples them adds its part.
+  void update(NodalFields<dim> &nodal);
+  /// Find what flows and is squeezed out.
+  void finish(const NodalFields<dim> &nodal);
 
-  /// What the points bring, before solve().
+  /// What the points bring, before begin().
   CellSums sums;
   /// Increments [Pa].
   const double *increments() const { return x.begin(); }
   /// Of the last step, in its middle, over this rank's cells [m^dim].
   double fluid_outflow() const { return outflow; }
   double fluid_squeezed() const { return squeezed; }
-  const PressureWork &work() const { return done; }
+  unsigned long n_multigrids() const { return multigrids_made; }
 
 private:
   using Vector = dealii::LinearAlgebra::distributed::Vector<double>;
@@ -78,24 +82,34 @@ private:
   static constexpr unsigned int n_modes = dim == 2 ? 1 : 4;
   static constexpr unsigned int mode_directions[4] = {3, 5, 6, 7};
 
+  friend class PressureSystem<dim>;
+
   void find_responses(const NodeFreedom<dim> &freedom, const NodalFields<dim> &nodal);
+  void find_mode_responses();
   void find_right_side(const dealii::Tensor<1, dim> &gravity, const NodalFields<dim> &nodal);
-  /// q = B X, summed over ranks.
-  void to_nodes(const Vector &pressures) const;
-  void apply(const Vector &pressures, Vector &image) const;
+  void find_diagonal();
   /// Add a multiple of what it makes of these pressures.
   void add_stabilisation(const Vector &pressures, double factor, Vector &result) const;
-  void find_diagonal();
-  void precondition(const Vector &r, Vector &z) const;
   void make_multigrid();
-  unsigned int iterate();
-  void update(NodalFields<dim> &nodal);
+
+  // For the solution.
+  /// Squared, of this rank's entries, in the norm of the inverse diagonal.
+  double squared_norm(const Vector &vector) const;
+  /// q = B X, summed over ranks.
+  void to_nodes(const Vector &pressures);
+  /// What nodes make of q, each alone, in `response`.
+  void find_accelerations_and_fluxes();
+  /// The image of pressures from q, or from what coupled nodes make of it.
+  void apply(const Vector &pressures, Vector &image);
+  void precondition(const Vector &r, Vector &z) const;
+  /// After so many iterations: is it worth while to have multigrid, or a new one?
+  void judge_preconditioner(unsigned int n_iterations);
 
   const ActiveNodes<dim> &active;
+  NodalResponse &response;
   const double alpha;
   const bool seepage_inertia;
   const double stabilisation;
-  const double tolerance;
   MPI_Comm communicator;
 
   std::vector<CellId> cell_of_unknown;
@@ -110,19 +124,21 @@ private:
   double dt = 0.;
   std::vector<double> mobility;      ///< of the acceleration: weight alpha / m
   std::vector<double> conductance;   ///< of the flux
-  std::vector<double> response;      ///< G
+  std::vector<double> yield;         ///< G of nodes that are not coupled
   std::vector<double> mode_response; ///< of alternating pressures, n_modes columns
   std::vector<std::pair<std::uint32_t, dealii::Tensor<2, dim>>> walls; ///< conductances there
-  mutable std::vector<double> q, mode;
+  std::vector<double> q, carry, gross;
+  mutable std::vector<double> mode;
+  std::vector<dealii::Tensor<1, dim>> through_walls;
 
   Vector x, change, right_side, diagonal, r, z, direction, image;
-  double round_off = 0.; ///< of the right side, in its norm
+  double round_off = 0.; ///< of this rank's right side, squared, in its norm
   double outflow = 0., squeezed = 0.;
 
   dealii::TrilinosWrappers::SparseMatrix star;
   std::unique_ptr<dealii::TrilinosWrappers::PreconditionAMG> multigrid;
   bool wants_multigrid = false;
   unsigned int fresh_iterations = 0; ///< of the first solve with this multigrid; 0: none yet
-  PressureWork done;
+  unsigned long multigrids_made = 0;
 };
 } // namespace peat
