@@ -5,7 +5,7 @@ namespace {
 /// A node is small with less than this share of the mass of those behind it; the edges and corners of a body
 /// that fills its cells have a half.
 constexpr double small_share = 0.1;
-/// Of the stiffness with which the material behind the node resists.
+/// Of the stiffness and the inertia with which the material behind the node resists.
 constexpr double strength = 1e-2;
 } // namespace
 
@@ -25,7 +25,8 @@ void SmallNodes<dim>::survey(const dealii::TrilinosWrappers::MPI::Vector &mass, 
         mass(line.node[2]) <= nothing)
       return;
     const double share = 1. - own / (small_share * behind);
-    links.push_back({line, strength * share * behind * speed * speed / (line.near * line.near)});
+    const double weight = strength * share * behind;
+    links.push_back({line, weight * speed * speed / (line.near * line.near), weight});
   });
 }
 
@@ -40,6 +41,9 @@ void SmallNodes<dim>::assemble(const TimeLevel &level, const StepState &state,
   std::vector<Index> unknowns(3);
   dealii::FullMatrix<double> local(3, 3);
   for (const Link &link : links) {
+    // The stiffness is nothing beside inertia where steps are short, and points hardly say how such a node
+    // moves.
+    const double resistance = link.stiffness * level.share + link.mass * level.acceleration;
     const double ratio = link.line.near / link.line.far;
     const std::array<double, 3> bend = {1., -1. - ratio, ratio};
     for (unsigned int d = 0; d < dim; ++d) {
@@ -49,9 +53,9 @@ void SmallNodes<dim>::assemble(const TimeLevel &level, const StepState &state,
         off += bend[i] * state.unknown.block(0)(unknowns[i]);
       }
       for (unsigned int i = 0; i < 3; ++i) {
-        residual.block(0)(unknowns[i]) -= link.stiffness * level.share * bend[i] * off;
+        residual.block(0)(unknowns[i]) -= resistance * bend[i] * off;
         for (unsigned int j = 0; j < 3; ++j)
-          local(i, j) = link.stiffness * level.share * bend[i] * bend[j];
+          local(i, j) = resistance * bend[i] * bend[j];
       }
       if (matrix)
         constraints.distribute_local_to_global(local, unknowns, *matrix);

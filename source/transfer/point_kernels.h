@@ -90,12 +90,14 @@ private:
         local[c][i] = field[std::size_t(cell_nodes[i]) * n_components + c];
   }
 
-  /// Velocity gradient without its symmetric part.
+  /// Of the velocity gradient what is a rotation. The skew part of a shear is none: in a cell that is long in
+  /// one direction it would put velocities across it that are larger than the shear itself.
   static void keep_spin(Lanes (*C)[dim])
   {
     for (unsigned int d = 0; d < dim; ++d)
       for (unsigned int e = 0; e <= d; ++e) {
-        const Lanes rate = 0.5 * (C[d][e] - C[e][d]);
+        const Lanes a = C[d][e], b = -C[e][d];
+        const Lanes rate = a * b > 0. ? (a * a < b * b ? a : b) : broadcast(0.);
         C[d][e] = rate;
         C[e][d] = -rate;
       }

@@ -43,6 +43,7 @@ private:
   {
     Line line;
     double stiffness; ///< [N/m]
+    double mass;      ///< [kg]
   };
   /// Lines whose middle node is this rank's.
   template <typename Action>
