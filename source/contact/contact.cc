@@ -71,6 +71,7 @@ ContactParameters<dim> ContactParameters<dim>::tied(const std::string &first, co
   contact.first = first;
   contact.second = second;
   contact.law = tied_law();
+  contact.interface = Interface::open;
   return contact;
 }
 

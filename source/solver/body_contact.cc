@@ -101,9 +101,8 @@ void BodyContact<dim>::begin(const double dt)
 }
 
 template <int dim>
-void BodyContact<dim>::find_normals()
+void BodyContact<dim>::find_volume_gradients()
 {
-  using Normal = typename ContactParameters<dim>::Normal;
   for (unsigned int side = 0; side < 2; ++side) {
     auto &gradient = volume_gradient[side];
     gradient.assign(sites.size() * dim, 0.);
@@ -112,6 +111,23 @@ void BodyContact<dim>::find_normals()
         gradient[std::size_t(entry.site) * dim + d] += near[side].points()[entry.point].volume * entry.dN[d];
     add_over_ranks(gradient, dim, side);
   }
+}
+
+template <int dim>
+typename BodyContact<dim>::Vector BodyContact<dim>::outward(const unsigned int side,
+                                                            const std::size_t s) const
+{
+  Vector g;
+  for (unsigned int d = 0; d < dim; ++d)
+    g[d] = volume_gradient[side][s * dim + d];
+  return g;
+}
+
+template <int dim>
+void BodyContact<dim>::find_normals()
+{
+  using Normal = typename ContactParameters<dim>::Normal;
+  find_volume_gradients();
   const Normal method = this->parameters.normal;
   if (method == Normal::regression)
     planes.fit(
@@ -122,13 +138,9 @@ void BodyContact<dim>::find_normals()
                                 : converged;
         });
   for (std::size_t s = 0; s < sites.size(); ++s) {
-    Vector g[2];
-    for (unsigned int side = 0; side < 2; ++side)
-      for (unsigned int d = 0; d < dim; ++d)
-        g[side][d] = volume_gradient[side][s * dim + d];
     const Vector n = method == Normal::prescribed   ? this->parameters.direction
                      : method == Normal::regression ? planes.normal(s)
-                                                    : g[0] - g[1];
+                                                    : outward(0, s) - outward(1, s);
     sites[s].normal = n.norm() > 0. ? n / n.norm() : n;
   }
 }
@@ -164,6 +176,21 @@ void BodyContact<dim>::take_all_nodes()
     site.acts = has_mass(site);
     site.first_surface = {{site.first, no_index, no_index}, {1., 0., 0.}};
     site.second_surface = {{site.second, no_index, no_index}, {1., 0., 0.}};
+  }
+  if (this->parameters.interface == ContactParameters<dim>::Interface::open ||
+      !(first.is_saturated() || second.is_saturated()))
+    return;
+  // Fluid meets the interface where both bodies have a surface.
+  for (unsigned int side = 0; side < 2; ++side)
+    near[side].collect(continuum(side).nodes());
+  find_volume_gradients();
+  for (std::size_t s = 0; s < sites.size(); ++s) {
+    ContactSite<dim> &site = sites[s];
+    const Vector g[2] = {outward(0, s), outward(1, s)};
+    const double size = (g[0] - g[1]).norm();
+    site.normal = size > 0. ? (g[0] - g[1]) / size : Vector();
+    const double own = g[0] * site.normal, others = -(g[1] * site.normal);
+    site.area = site.acts && std::min(own, others) > 0.5 * std::max(own, others) ? std::min(own, others) : 0.;
   }
 }
 
@@ -367,7 +394,7 @@ template <int dim>
 void BodyContact<dim>::constrain_flux()
 {
   for (const ContactSite<dim> &site : sites)
-    if (site.counts && site.impulse * site.normal > 0.) {
+    if (site.counts && this->is_covered(site)) {
       this->note_flux(first, site.first_surface, site.normal, site.area, noted[0]);
       this->note_flux(second, site.second_surface, -site.normal, site.area, noted[1]);
     }

@@ -291,8 +291,8 @@ void ContactPair<dim>::hold(const std::uint32_t s, const Vector &compliance)
     site.mass[d] = compliance[d] > 0. ? 1. / compliance[d] : 0.;
   }
   site.normal_mass = normal_compliance > 0. ? 1. / normal_compliance : 0.;
-  site.closes_flux = parameters.interface == ContactParameters<dim>::Interface::impermeable &&
-                     site.impulse * site.normal > 0.;
+  site.closes_flux =
+      parameters.interface == ContactParameters<dim>::Interface::impermeable && is_covered(site);
   held_sites.push_back(s);
 }
 

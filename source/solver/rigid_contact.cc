@@ -16,7 +16,7 @@ constexpr double influence = 0.5 + 1e-9;
 constexpr double normal_range = 0.25;
 /// By so much the gap of the nearest point may be less than the mean of those near it, and still count [cell
 /// sizes].
-constexpr double gap_slack = 0.015;
+constexpr double gap_slack = 0.02;
 
 template <std::size_t n>
 void add_over_ranks(std::array<double, n> &values, MPI_Comm communicator)
@@ -521,7 +521,7 @@ template <int dim>
 void RigidContact<dim>::constrain_flux()
 {
   for (const ContactSite<dim> &site : sites)
-    if (site.counts && site.impulse * site.normal > 0.)
+    if (site.counts && this->is_covered(site))
       this->note_flux(continuum, site.second_surface, -site.normal, site.area, noted);
   this->change_flux(continuum, noted);
 }

@@ -21,7 +21,8 @@ struct ContactParameters
   /// What pore fluid meets at the interface.
   enum class Interface {
     impermeable, ///< R.n = 0
-    drained      ///< a given pressure
+    drained,     ///< a given pressure
+    open         ///< nothing: bodies that share their fluid, as those do between which no contact is named
   };
   /// Where the normal of two deformable bodies comes from.
   enum class Normal {

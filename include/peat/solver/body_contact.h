@@ -33,6 +33,9 @@ private:
   using ContactPair<dim>::sites;
   using ContactPair<dim>::held_sites;
 
+  void find_volume_gradients();
+  /// Gradient of a body's volume at a site, out of the body [m^(dim-1)].
+  Vector outward(unsigned int side, std::size_t s) const;
   void find_normals();
   void find_gaps();
   void find_surfaces();

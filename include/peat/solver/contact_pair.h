@@ -141,6 +141,11 @@ protected:
   /// the nodes have had [N], and what a further impulse along -n adds to it [1/s] (theory.md, contact).
   std::pair<double, double> fluid_force(const Continuum<dim> &continuum, const SurfaceNodes &surface,
                                         const Vector &n, double area) const;
+  /// Whether fluid meets the interface there: where bodies are tied, or press on each other.
+  bool is_covered(const ContactSite<dim> &site) const
+  {
+    return parameters.law->ties() ? site.area > 0. : site.impulse * site.normal > 0.;
+  }
   /// Note what the interface makes of the flux where bodies touch; n points out of the continuum.
   void note_flux(const Continuum<dim> &continuum, const SurfaceNodes &surface, const Vector &n, double area,
                  NodalAdditions<dim> &noted) const;
