@@ -214,6 +214,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--peat", default=os.path.join(HERE, "..", "build", "peat"), help="the program")
     parser.add_argument("--jobs", type=int, default=2, help="programs at a time")
+    parser.add_argument("--share", type=int, default=1, metavar="N", help="one case of N")
     parser.add_argument("--verbose", action="store_true", help="show all messages")
     parser.add_argument("names", nargs="*", help="only cases whose names contain one of these")
     options = parser.parse_args()
@@ -230,6 +231,8 @@ def main():
         cases.append((name, shlex.split(arguments), words))
     if options.names:
         cases = [case for case in cases if any(name in case[0] for name in options.names)]
+
+    cases = cases[::options.share]
 
     workplaces = queue.Queue()
     for _ in range(options.jobs):

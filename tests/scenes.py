@@ -410,7 +410,7 @@ CASES = {
     "N1": (n1, ("quick", "full"), 8),
     "N1_all": (lambda c: n1(c, (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)), ("full",), 20),
     "N2": (n2, ("quick", "full"), 1),
-    "parallel": (parallel, ("quick", "full"), 15),
+    "parallel": (parallel, ("full",), 15),
 }
 
 if __name__ == "__main__":

@@ -290,8 +290,9 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
   mpm.prepare();
   begin_stage(stage, mpm.stable_step());
   if (!scene.contacts.empty() && scene.is_saturated() && stage_scheme.basis == Basis::q1)
-    log.line("note: 'Basis = q1' is not always stable where saturated bodies are in contact (doc/stability.md); "
-             "'gimp' is");
+    log.line(
+        "note: 'Basis = q1' is not always stable where saturated bodies are in contact (doc/stability.md); "
+        "'gimp' is");
   ContactEvents<dim> events(log);
   const double energy_at_start = totals(scene, communicator).energy();
 

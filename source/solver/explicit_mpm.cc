@@ -256,7 +256,8 @@ void ExplicitMPM<dim>::relocate_points()
       scene.probes->migrate();
   }
   // On several ranks nodes are numbered anew when they would be on one, and not when a point of an occupied
-  // cell changes its rank: some things are looked for when nodes change, and must not depend on the partition.
+  // cell changes its rank: some things are looked for when nodes change, and must not depend on the
+  // partition.
   if (flags[leaves_rank] && parallel) {
     int changed = 0;
     for (const auto &body : scene.bodies)
