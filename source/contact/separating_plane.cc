@@ -16,7 +16,7 @@ template <int dim>
 void SeparatingPlanes<dim>::find_shifts()
 {
   for (std::size_t site = 0; site < shifts.size(); ++site)
-    shifts[site] = stage == 0 ? dealii::Tensor<1, dim>() : share_to_surface * normal(site, stage - 1);
+    shifts[site] = stage == 0 ? dealii::Tensor<1, dim>() : normal(site, stage - 1);
 }
 
 template <int dim>
@@ -27,8 +27,9 @@ void SeparatingPlanes<dim>::add(const NearPoints<dim> &points, const double side
     const double *plane = &planes[stage][std::size_t(entry.site) * n_unknowns];
     double X[n_unknowns];
     const auto &point = points.points()[entry.point];
-    const auto &shift = shifts[entry.site];
-    const auto x = point.x - side * point.reach(shift) * (shift.norm() > 0. ? shift / shift.norm() : shift);
+    auto x = point.x;
+    if (stage > 0)
+      x -= side * share_to_surface * point.reach(shifts[entry.site]) * shifts[entry.site];
     double s = plane[dim];
     X[dim] = 1.;
     for (unsigned int d = 0; d < dim; ++d) {
@@ -52,7 +53,9 @@ bool SeparatingPlanes<dim>::improve()
   // Keeps the planes of separable points finite: the smaller, the steeper they are and the fewer points
   // decide.
   constexpr double penalty = 1e-4;
-  constexpr double still = 1e-11;
+  // Newton's method squares what is left after a change of this size. The first stage only says which way
+  // points are moved.
+  const double still = stage + 1 < n_stages ? 1e-3 : 1e-5;
   using Matrix = Eigen::Matrix<double, n_unknowns, n_unknowns>;
   using Vector = Eigen::Matrix<double, n_unknowns, 1>;
   bool converged = true;

@@ -63,8 +63,8 @@ private:
   std::vector<double> sums;
   unsigned int stage = 0;
   std::array<std::vector<double>, n_stages> planes; ///< n_unknowns a site
-  /// Points of the first body are moved by their reach in the direction of these times their length, those of
-  /// the second the other way.
+  /// Directions in which points of the first body are moved towards its surface, those of the second the
+  /// other way.
   std::vector<dealii::Tensor<1, dim>> shifts;
 };
 } // namespace peat
