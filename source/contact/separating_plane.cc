@@ -10,11 +10,13 @@ void SeparatingPlanes<dim>::reinit(const std::size_t n_sites)
   for (auto &of_stage : planes)
     of_stage.assign(n_sites * n_unknowns, 0.);
   shifts.resize(n_sites);
+  settled.resize(n_sites);
 }
 
 template <int dim>
 void SeparatingPlanes<dim>::find_shifts()
 {
+  std::fill(settled.begin(), settled.end(), 0);
   for (std::size_t site = 0; site < shifts.size(); ++site)
     shifts[site] = stage == 0 ? dealii::Tensor<1, dim>() : normal(site, stage - 1);
 }
@@ -24,6 +26,8 @@ void SeparatingPlanes<dim>::add(const NearPoints<dim> &points, const double side
                                 const std::vector<dealii::Point<dim>> &center, const double length)
 {
   for (const auto &entry : points.neighbours()) {
+    if (settled[entry.site])
+      continue;
     const double *plane = &planes[stage][std::size_t(entry.site) * n_unknowns];
     double X[n_unknowns];
     const auto &point = points.points()[entry.point];
@@ -68,7 +72,7 @@ bool SeparatingPlanes<dim>::improve()
         A(i, j) = A(j, i) = *sum++;
     Vector b(sum);
     // No points, or those of one body alone.
-    if (A(dim, dim) == 0.)
+    if (settled[site] || A(dim, dim) == 0.)
       continue;
     for (unsigned int d = 0; d < dim; ++d) {
       A(d, d) += penalty;
@@ -82,8 +86,9 @@ bool SeparatingPlanes<dim>::improve()
     if (change.norm() > limit)
       change *= limit / change.norm();
     plane += change;
-    converged =
-        converged && (plane.template head<dim>().normalized() - before.template head<dim>()).norm() < still;
+    // Each for itself: what a site gets must not depend on which others its rank knows.
+    settled[site] = (plane.template head<dim>().normalized() - before.template head<dim>()).norm() < still;
+    converged = converged && settled[site];
   }
   return converged;
 }

@@ -57,7 +57,7 @@ private:
   void find_shifts();
   void add(const NearPoints<dim> &points, double side, const std::vector<dealii::Point<dim>> &center,
            double length);
-  /// One Newton step; true if no plane turned any more.
+  /// One Newton step for the planes that have not been found; true if all have been.
   bool improve();
 
   std::vector<double> sums;
@@ -66,5 +66,6 @@ private:
   /// Directions in which points of the first body are moved towards its surface, those of the second the
   /// other way.
   std::vector<dealii::Tensor<1, dim>> shifts;
+  std::vector<char> settled; ///< by site: its plane has been found in this stage
 };
 } // namespace peat
