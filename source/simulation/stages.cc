@@ -292,7 +292,7 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
   if (!scene.contacts.empty() && scene.is_saturated() && stage_scheme.basis == Basis::q1)
     log.line(
         "note: 'Basis = q1' is not always stable where saturated bodies are in contact (doc/stability.md); "
-        "'gimp' is");
+        "prefer 'gimp'");
   ContactEvents<dim> events(log);
   const double energy_at_start = totals(scene, communicator).energy();
 
