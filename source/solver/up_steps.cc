@@ -40,6 +40,8 @@ template <int dim>
 void UpSolver<dim>::start(const Mode stage_mode)
 {
   mode = stage_mode;
+  if (method == Method::material_points && contact.enter())
+    prepare();
   damped_steps_left = parameters.start_steps;
   next_step = 0.;
   first_step_done = false;
@@ -311,6 +313,8 @@ double UpSolver<dim>::find_stages(const double dt)
   if (mode == Mode::dynamic && !linear)
     unknown.block(0).equ(g * dt, mean_velocity());
   TimeLevel level = stage_level(dt, false);
+  contact.begin_step(now);
+  contact.begin_stage(level, now, now + g * dt, 0., 0.);
   solve(level, now, now + g * dt, parameters.newton_tolerance);
 
   // k_1 = (Y_1 - y_n)/(g dt);  k_2 = (Y_2 - y_n)/(g dt) - (1 - g)/g k_1, of u and p, and of v, where v_2 is
@@ -331,6 +335,8 @@ double UpSolver<dim>::find_stages(const double dt)
     state.second_history = accelerations;
   }
   level = stage_level(dt, true);
+  contact.begin_stage(level, now, now + dt, -(1. - g) / g,
+                      mode == Mode::dynamic ? -2. * (1. - g) / (g * g * dt) : 0.);
   solve(level, now, now + dt, parameters.newton_tolerance);
 
   // Against the first-order y_n + dt k_1.
@@ -377,6 +383,7 @@ double UpSolver<dim>::estimated_error(const BlockVector &difference)
     change_scale[b] = std::max({change_scale[b], 2. * changes[b], least[b]});
     error = std::max(error, change_scale[b] > 0. ? errors[b] / change_scale[b] : 0.);
   }
+  error = std::max(error, contact.estimated_error(parameters.step_tolerance));
   // Points must not pass a cell.
   if (method == Method::material_points) {
     const double farthest = unknown.block(0).linfty_norm() / (0.5 * grid.smallest_cell_size());
@@ -402,6 +409,7 @@ void UpSolver<dim>::book_work(const TimeLevel &level, const double share,
   const auto held = boundary.reactions(level, residual, motion);
   const auto loads = boundary.loads(level, ghosted_motion.block(0));
   const double dt = share * level.dt;
+  contact.book_work(level, share, ghosted_motion.block(0), book);
   book.impulse += dt * (held.force + loads.force + weight);
   book.gross_impulse += dt * (held.gross_force + loads.gross_force + weight.norm());
   book.external_work += share * (held.work + loads.work + gravity_work);
