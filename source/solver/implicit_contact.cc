@@ -145,7 +145,7 @@ template <int dim>
 void ImplicitContact<dim>::begin_step(const double time)
 {
   step_start = time;
-  first_guess = true;
+  is_first_stage = true;
   for (const auto &mover : movers) {
     mover->start = mover->rigid.motion();
     mover->displacement = Generalised();
@@ -219,12 +219,18 @@ void ImplicitContact<dim>::begin_stage(const TimeLevel &level, const double star
     if (mover->rigid.is_prescribed()) {
       mover->rigid.begin_step(start, end - start, Vector());
       mover->displacement = (end - start) * mover->rigid.motion();
-    } else if (first_guess && level.acceleration > 0.)
+    } else if (is_first_stage && level.acceleration > 0.)
       mover->displacement = (end - start) * mover->start;
   }
   for (const auto &touch : touches)
-    for (Place &place : touch->places)
+    for (Place &place : touch->places) {
       place.penalty = stiffness(*touch, touch->sites[place.site].area);
+      place.is_known = !is_first_stage;
+      place.known_force = place.force;
+      place.known_relative = place.relative;
+    }
+  predicting = true;
+  is_first_stage = false;
 }
 
 template <int dim>

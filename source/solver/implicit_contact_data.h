@@ -58,6 +58,8 @@ struct ImplicitContact<dim>::Place
   double penalty = 0.;  ///< [N/m]
   Vector multiplier;    ///< force on the bodies [N]
   Vector force;         ///< the same, with what the present gap adds
+  bool is_known = false; ///< an earlier stage of the step has found it
+  Vector known_force, known_relative; ///< there
   Vector relative;      ///< displacement of the bodies' surface less that of the rigid one [m]
   ContactMode mode = ContactMode::sticks;
   dealii::Tensor<2, dim> tangent; ///< minus the force's derivative with `relative` [N/m]

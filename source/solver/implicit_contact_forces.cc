@@ -45,6 +45,30 @@ double ImplicitContact<dim>::fluid_force(const Touch &touch, const ContactSite<d
 }
 
 template <int dim>
+bool ImplicitContact<dim>::predict(const Touch &touch, Place &place, const Vector &relative,
+                                   const Vector &n) const
+{
+  // Forces on the way to the first solution are the penalty's, far from those that come out: whether sites
+  // part or slide is asked after it.
+  if (place.mode == ContactMode::open)
+    return false;
+  if (place.is_known) {
+    place.force = place.known_force - place.tangent * (relative - place.known_relative);
+    return true;
+  }
+  if (place.gap > 0.)
+    return false;
+  const bool bears_shear = touch.parameters.law->shear_limit(1., 1., false) > 0.;
+  place.mode = bears_shear ? ContactMode::sticks : ContactMode::slides;
+  place.tangent = place.penalty * outer_product(n, n);
+  for (unsigned int d = 0; d < dim && bears_shear; ++d)
+    for (unsigned int e = 0; e < dim; ++e)
+      place.tangent[d][e] += place.penalty * place.free[d] * ((d == e) - n[d] * n[e]);
+  place.force = -(place.tangent * relative);
+  return true;
+}
+
+template <int dim>
 void ImplicitContact<dim>::respond(const Touch &touch, const ContactSite<dim> &site, Place &place,
                                    const Vector &relative, const double fluid) const
 {
@@ -55,7 +79,6 @@ void ImplicitContact<dim>::respond(const Touch &touch, const ContactSite<dim> &s
   for (unsigned int d = 0; d < dim; ++d)
     freedom[d][d] = place.free[d];
   place.relative = relative;
-  place.slip = Vector();
   if (law.ties()) {
     place.mode = ContactMode::sticks;
     place.tangent = penalty * freedom;
@@ -63,14 +86,16 @@ void ImplicitContact<dim>::respond(const Touch &touch, const ContactSite<dim> &s
     return;
   }
 
+  if (predicting && predict(touch, place, relative, n))
+    return;
+
   // Equation (55) of theory.md.
+  place.slip = Vector();
   const bool slid = place.mode == ContactMode::slides;
   const double gap = place.gap + n * relative;
   const double least = place.gap == 0. ? -law.tension_limit(site.area) : 0.;
   double normal_force = place.multiplier * n - penalty * gap;
-  // Before anything is known, what is closed is held.
-  const bool guessed = first_guess && gap <= 0.;
-  if (normal_force <= least && !guessed) {
+  if (normal_force <= least) {
     place.mode = ContactMode::open;
     place.force = Vector();
     place.tangent = dealii::Tensor<2, dim>();
@@ -85,9 +110,7 @@ void ImplicitContact<dim>::respond(const Touch &touch, const ContactSite<dim> &s
   const Vector shear = place.multiplier - (place.multiplier * n) * n - penalty * along;
   const double wanted = shear.norm();
   const double bearing = std::max(0., normal_force - fluid);
-  const double limit =
-      guessed ? law.shear_limit(penalty * grid.smallest_cell_size(), site.area, false)
-              : law.shear_limit(bearing, site.area, slid);
+  const double limit = law.shear_limit(bearing, site.area, slid);
   if (limit > 0. && wanted <= limit) {
     place.mode = ContactMode::sticks;
     place.force += shear;
@@ -204,7 +227,7 @@ void ImplicitContact<dim>::augment(const StepState &state)
 {
   if (movers.empty())
     return;
-  first_guess = false;
+  predicting = false;
   evaluate(state);
   for (const auto &touch : touches)
     for (Place &place : touch->places)

@@ -109,6 +109,9 @@ private:
   Vector displacement(const Place &place, const BodyVector &field) const;
   /// Forces at the unknowns, and what they make of the rigid bodies.
   void evaluate(const StepState &state);
+  /// The force if the place stays what it was, or is closed and sticks as far as anyone knows; false if that
+  /// says nothing.
+  bool predict(const Touch &touch, Place &place, const Vector &relative, const Vector &n) const;
   /// The force at a place, and how it changes with the displacement.
   void respond(const Touch &touch, const ContactSite<dim> &site, Place &place, const Vector &relative,
                double fluid) const;
@@ -134,7 +137,8 @@ private:
   TimeLevel stage;
   Vector gravity; ///< [m/s^2]
   double step_start = 0.;
-  bool first_guess = false;      ///< no force has been found in this step
+  bool is_first_stage = false;   ///< the next one
+  bool predicting = false;       ///< the stage has no solution yet
   bool tangent_changed = false;  ///< since the matrix was made
   bool responses_known = false;  ///< the movers' `response` belongs to the matrix
   double guessed = 0.;           ///< forces beyond the multipliers: root of the sum of squares [N]
