@@ -229,6 +229,7 @@ void ImplicitContact<dim>::begin_stage(const TimeLevel &level, const double star
       place.known_force = place.force;
       place.known_relative = place.relative;
     }
+  earlier_share = -rate_factor;
   predicting = true;
   is_first_stage = false;
 }
@@ -240,6 +241,9 @@ double ImplicitContact<dim>::stiffness(const Touch &touch, const double area) co
   // do; not so far that round-off counts.
   constexpr double above = 1e3;
   const double h = grid.smallest_cell_size();
+  // At the edge of a body a site has little area, but neighbours that resist.
+  constexpr double least = 0.1;
+  const double size = std::max(area, least * std::pow(h, dim - 1));
   double largest = 0.;
   for (const Body<dim> *body : touch.bodies) {
     const Material &material = body->material();
@@ -250,7 +254,7 @@ double ImplicitContact<dim>::stiffness(const Touch &touch, const double area) co
                  (mixture->storage() + 12. * mixture->mobility() * stage.dt / (h * h));
     largest = std::max(largest, modulus / h + material.density() * h * stage.acceleration);
   }
-  return above * largest * area;
+  return above * largest * size;
 }
 
 template <int dim>
@@ -426,6 +430,7 @@ void ImplicitContact<dim>::book_work(const TimeLevel &level, const double share,
   for (const auto &touch : touches) {
     if (!means)
       touch->sums.fill(0.);
+    touch->sums[dim + 1] = 0.;
     touch->gap = ContactSite<dim>::far;
     for (const Place &place : touch->places) {
       const ContactSite<dim> &site = touch->sites[place.site];
@@ -438,13 +443,12 @@ void ImplicitContact<dim>::book_work(const TimeLevel &level, const double share,
         book.gross_impulse += share * dt * place.force.norm();
       }
       touch->gap = std::min(touch->gap, site.gap + site.normal * place.relative);
-      if (place.mode == ContactMode::open)
-        continue;
       const double factor = means ? share : 1.;
       for (unsigned int d = 0; d < dim; ++d)
         touch->sums[d] += factor * place.force[d];
       touch->sums[dim] += factor * (place.force * site.normal);
-      touch->sums[dim + 1] += factor * site.area;
+      if (place.mode != ContactMode::open)
+        touch->sums[dim + 1] += site.area;
     }
   }
 }

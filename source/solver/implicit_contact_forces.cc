@@ -89,31 +89,38 @@ void ImplicitContact<dim>::respond(const Touch &touch, const ContactSite<dim> &s
   if (predicting && predict(touch, place, relative, n))
     return;
 
-  // Equation (55) of theory.md.
+  // Equation (55) of theory.md. With inertia a step's impulse obeys the law, and so does its mean force:
+  // weight times the last stage's with what earlier ones have given to it.
+  const bool means = stage.acceleration > 0. && place.is_known;
+  const double history = means ? earlier_share : 0., weight = 1. / (1. + history);
   place.slip = Vector();
   const bool slid = place.mode == ContactMode::slides;
+  const Vector before = history * place.known_force;
+  const Vector multiplier = place.multiplier + before;
   const double gap = place.gap + n * relative;
   const double least = place.gap == 0. ? -law.tension_limit(site.area) : 0.;
-  double normal_force = place.multiplier * n - penalty * gap;
+  double normal_force = weight * (multiplier * n - penalty * gap);
   if (normal_force <= least) {
     place.mode = ContactMode::open;
-    place.force = Vector();
+    place.force = -before;
     place.tangent = dealii::Tensor<2, dim>();
     return;
   }
   normal_force = std::max(normal_force, least);
-  place.force = normal_force * n;
+  place.force = normal_force / weight * n - before;
   place.tangent = penalty * outer_product(n, n);
 
   Vector along = freedom * (relative - (n * relative) * n);
   along -= (along * n) * n;
-  const Vector shear = place.multiplier - (place.multiplier * n) * n - penalty * along;
+  const Vector shear = weight * (multiplier - (multiplier * n) * n - penalty * along);
   const double wanted = shear.norm();
   const double bearing = std::max(0., normal_force - fluid);
   const double limit = law.shear_limit(bearing, site.area, slid);
-  if (limit > 0. && wanted <= limit) {
+  // What would slide back has stuck on the way: friction must not push it to and fro.
+  const bool turns_back = place.matrix_mode == ContactMode::slides && shear * place.matrix_slip < 0.;
+  if (limit > 0. && (wanted <= limit || turns_back)) {
     place.mode = ContactMode::sticks;
-    place.force += shear;
+    place.force += shear / weight;
     place.tangent += penalty * (freedom - outer_product(freedom * n, n));
     return;
   }
@@ -123,7 +130,7 @@ void ImplicitContact<dim>::respond(const Touch &touch, const ContactSite<dim> &s
     return;
   const double friction = std::min(wanted, law.shear_limit(bearing, site.area, true));
   place.slip = shear / wanted;
-  place.force += friction * place.slip;
+  place.force += friction / weight * place.slip;
   const double ratio =
       bearing > 0. ? (friction - std::min(friction, law.shear_limit(0., site.area, true))) / bearing : 0.;
   place.tangent += penalty * ratio * outer_product(place.slip, n);
@@ -196,9 +203,9 @@ void ImplicitContact<dim>::find_residual(Mover &mover) const
     const Generalised acceleration = stage.acceleration * mover.displacement + mover.acceleration_history +
                                      stage.old_velocity * mover.start;
     const auto mass = mover.rigid.mass_matrix();
-    const Generalised inertia = mass * acceleration;
-    mover.residual -= inertia;
-    mover.force_scale += inertia.norm();
+    mover.residual -= mass * acceleration;
+    // What would stop it within the stage.
+    mover.force_scale += std::abs(stage.old_velocity) * Generalised(mass * mover.start).norm();
     if constexpr (dim == 3) {
       // Euler's equations, with the inertia at the start of the step.
       const Generalised rate = stage.velocity * mover.displacement + mover.rate_history;
@@ -245,10 +252,9 @@ void ImplicitContact<dim>::assemble(const TimeLevel &level, const StepState &sta
   evaluate(state);
   for (const auto &touch : touches)
     for (const Place &place : touch->places)
-      if (place.mode != ContactMode::open)
-        for (unsigned int k = 0; k < place.n; ++k)
-          for (unsigned int d = 0; d < dim; ++d)
-            system.residual.block(0)(place.unknown[k][d]) += place.weight[k] * place.force[d];
+      for (unsigned int k = 0; k < place.n; ++k)
+        for (unsigned int d = 0; d < dim; ++d)
+          system.residual.block(0)(place.unknown[k][d]) += place.weight[k] * place.force[d];
   if (!system.matrix)
     return;
 

@@ -137,6 +137,7 @@ private:
   TimeLevel stage;
   Vector gravity; ///< [m/s^2]
   double step_start = 0.;
+  double earlier_share = 0.;     ///< weight of the stage before in the step over that of this one
   bool is_first_stage = false;   ///< the next one
   bool predicting = false;       ///< the stage has no solution yet
   bool tangent_changed = false;  ///< since the matrix was made
