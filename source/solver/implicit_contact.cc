@@ -5,6 +5,7 @@
 #include <deal.II/base/mpi.h>
 #include <deal.II/lac/full_matrix.h>
 
+#include <limits>
 #include <sstream>
 
 #include "implicit_contact_data.h"
@@ -310,67 +311,78 @@ double ImplicitContact<dim>::residual_scale(const double size) const
 }
 
 template <int dim>
-void ImplicitContact<dim>::correct(
-    const TimeLevel &level, BlockVector &correction,
-    const std::function<void(BlockVector &solution, const BlockVector &right_side)> &solve)
+void ImplicitContact<dim>::find_responses(const LinearSolve &solve)
 {
-  std::vector<Mover *> free;
-  for (const auto &mover : movers)
-    if (!mover->rigid.is_prescribed())
-      free.push_back(mover.get());
-  if (free.empty())
+  if (responses_known)
     return;
-  if (!responses_known)
-    for (Mover *mover : free)
-      for (unsigned int j = 0; j < n_motions; ++j)
-        if (mover->rigid.is_free(j) && mover->is_coupled) {
-          mover->response[j].reinit(mover->coupling[j]);
-          solve(mover->response[j], mover->coupling[j]);
-        }
+  for (const auto &mover : movers)
+    for (unsigned int j = 0; j < n_motions && mover->is_coupled; ++j)
+      if (mover->rigid.is_free(j)) {
+        mover->response[j].reinit(mover->coupling[j]);
+        solve(mover->response[j], mover->coupling[j]);
+      }
   responses_known = true;
+}
+
+template <int dim>
+double ImplicitContact<dim>::condensed(const TimeLevel &level, const Mover &mover, const unsigned int i,
+                                       const Mover &other, const unsigned int j) const
+{
+  double entry = 0.;
+  if (&mover == &other) {
+    entry = mover.slope[i][j] + level.acceleration * mover.rigid.mass_matrix()[i][j];
+    // Without inertia: what nothing resists.
+    const double spring = std::max(mover.force_scale, std::numeric_limits<double>::min()) * hesitation /
+                          (longest_way * grid.smallest_cell_size());
+    if (level.acceleration == 0. && i == j)
+      entry += spring * (i < dim ? 1. : mover.radius * mover.radius);
+  }
+  if (mover.is_coupled && other.is_coupled)
+    entry -= mover.reaction[i] * other.response[j];
+  return entry;
+}
+
+template <int dim>
+void ImplicitContact<dim>::correct(const TimeLevel &level, BlockVector &correction, const LinearSolve &solve)
+{
+  std::vector<std::pair<Mover *, unsigned int>> unknown;
+  for (const auto &mover : movers)
+    for (unsigned int i = 0; i < n_motions; ++i)
+      if (mover->rigid.is_free(i))
+        unknown.emplace_back(mover.get(), i);
+  if (unknown.empty())
+    return;
+  find_responses(solve);
 
   // Equation (57) of theory.md.
-  const double length = longest_way * grid.smallest_cell_size();
-  const unsigned int n = free.size() * n_motions;
-  dealii::FullMatrix<double> system(dealii::IdentityMatrix{n});
+  const unsigned int n = unknown.size();
+  dealii::FullMatrix<double> system(n, n);
   dealii::Vector<double> right(n), step(n);
-  for (std::size_t a = 0; a < free.size(); ++a) {
-    Mover &mover = *free[a];
-    const auto mass = mover.rigid.mass_matrix();
-    const double spring = std::max(mover.force_scale, 1e-300) / length * hesitation;
-    for (unsigned int i = 0; i < n_motions; ++i) {
-      if (!mover.rigid.is_free(i))
-        continue;
-      const unsigned int row = a * n_motions + i;
-      right(row) = mover.residual[i];
-      if (mover.is_coupled)
-        right(row) += mover.reaction[i] * correction;
-      for (unsigned int j = 0; j < n_motions; ++j)
-        if (mover.rigid.is_free(j))
-          system(row, a * n_motions + j) = mover.slope[i][j] + level.acceleration * mass[i][j];
-      if (level.acceleration == 0.)
-        system(row, row) += spring * (i < dim ? 1. : mover.radius * mover.radius);
-      for (std::size_t b = 0; b < free.size() && mover.is_coupled; ++b)
-        for (unsigned int j = 0; j < n_motions && free[b]->is_coupled; ++j)
-          if (free[b]->rigid.is_free(j))
-            system(row, b * n_motions + j) -= mover.reaction[i] * free[b]->response[j];
-    }
+  for (unsigned int a = 0; a < n; ++a) {
+    const auto [mover, i] = unknown[a];
+    right(a) = mover->residual[i];
+    if (mover->is_coupled)
+      right(a) += mover->reaction[i] * correction;
+    for (unsigned int b = 0; b < n; ++b)
+      system(a, b) = condensed(level, *mover, i, *unknown[b].first, unknown[b].second);
   }
   system.gauss_jordan();
   system.vmult(step, right);
+
   double farthest = 0.;
-  for (std::size_t a = 0; a < free.size(); ++a) {
-    for (unsigned int i = 0; i < n_motions; ++i)
-      free[a]->step[i] = step(a * n_motions + i);
-    farthest = std::max(farthest, reach(*free[a], free[a]->step));
-  }
+  for (const auto &mover : movers)
+    mover->step = Generalised();
+  for (unsigned int a = 0; a < n; ++a)
+    unknown[a].first->step[unknown[a].second] = step(a);
+  for (const auto &mover : movers)
+    farthest = std::max(farthest, reach(*mover, mover->step));
+  const double length = longest_way * grid.smallest_cell_size();
   const double factor = level.acceleration == 0. && farthest > length ? length / farthest : 1.;
-  for (Mover *mover : free) {
-    mover->step *= factor;
-    mover->displacement += mover->step;
-    for (unsigned int j = 0; j < n_motions && mover->is_coupled; ++j)
-      if (mover->rigid.is_free(j))
-        correction.add(mover->step[j], mover->response[j]);
+  for (const auto &[mover, i] : unknown) {
+    mover->step[i] *= factor;
+    mover->displacement[i] += mover->step[i];
+    if (mover->is_coupled)
+      correction.add(mover->step[i], mover->response[i]);
   }
 }
 

@@ -253,6 +253,8 @@ double UpSolver<dim>::runge_kutta_step(const double latest)
   std::ostringstream text;
   text << "no step after t = " << now << " s is accurate to 'Step tolerance', the last was " << dt
        << " s; loads that jump belong to the start of a stage";
+  if (!std::isfinite(error_before))
+    text << "; " << failure;
   throw NumericalError(text.str());
 }
 
@@ -295,7 +297,8 @@ double UpSolver<dim>::try_stages(const double dt)
     return find_stages(dt);
   try {
     return find_stages(dt);
-  } catch (const NumericalError &) {
+  } catch (const NumericalError &error) {
+    failure = error.what();
     matrix_is_valid = false;
     return std::numeric_limits<double>::infinity();
   }

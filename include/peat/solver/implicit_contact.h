@@ -25,6 +25,7 @@ class ImplicitContact
 public:
   using BodyVector = dealii::TrilinosWrappers::MPI::Vector;
   using Generalised = typename RigidBody<dim>::Generalised;
+  using LinearSolve = std::function<void(BlockVector &solution, const BlockVector &right_side)>;
 
   ImplicitContact(const Space<dim> &space, Scene<dim> &scene);
   ~ImplicitContact();
@@ -64,8 +65,7 @@ public:
   /// Find the rigid bodies' part of a Newton step.
   /// @param correction of the unknowns with rigid bodies that stand still; is completed
   /// @param solve a linear system with the matrix of the last assemble()
-  void correct(const TimeLevel &level, BlockVector &correction,
-               const std::function<void(BlockVector &solution, const BlockVector &right_side)> &solve);
+  void correct(const TimeLevel &level, BlockVector &correction, const LinearSolve &solve);
   /// Take back a share of the last step.
   void retreat(double share);
   /// Whether the free rigid bodies are in balance to a tolerance relative to the forces on them.
@@ -116,6 +116,11 @@ private:
   void respond(const Touch &touch, const ContactSite<dim> &site, Place &place, const Vector &relative,
                double fluid) const;
   void find_residual(Mover &mover) const;
+  /// The unknowns' answers to unit motions of the rigid bodies.
+  void find_responses(const LinearSolve &solve);
+  /// Row i of eq. (57) for one of the free rigid bodies: its entries for those of another.
+  double condensed(const TimeLevel &level, const Mover &mover, unsigned int i, const Mover &other,
+                   unsigned int j) const;
   void find_couplings(const UpSystem &system);
   /// Farthest that a part of the body moves [m].
   static double reach(const Mover &mover, const Generalised &motion);

@@ -172,6 +172,7 @@ private:
   Mode mode = Mode::dynamic;
   unsigned int damped_steps_left = 0;
   double next_step = 0.; ///< Runge-Kutta [s]; 0: none yet
+  std::string failure;   ///< of the iterations that were last given up
   bool first_step_done = false;
   std::array<double, 2> change_scale{};   ///< largest changes so far [m], [Pa]
   std::array<double, 2> residual_scale{}; ///< largest residuals so far: momentum [N], fluid [m^dim/s]
