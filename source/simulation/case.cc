@@ -12,7 +12,8 @@ StageParameters::StageParameters(Section section, const Scheme common) : name(se
   section.add(
       "Solver", solver_name, {"dynamic", "quasi-static", "static"},
       "'dynamic': the full equations. 'quasi-static': without inertia, in steps as long as the pressures "
-      "change slowly. 'static': the state of equilibrium and of steady seepage under the loads at that "
+      "change slowly; free rigid bodies are in equilibrium with what they rest on. 'static': the state of "
+      "equilibrium and of steady seepage under the loads at that "
       "time.");
   solver = solver_name == "static"         ? Solver::static_state
            : solver_name == "quasi-static" ? Solver::quasi_static

@@ -404,8 +404,7 @@ double ImplicitContact<dim>::estimated_error(const double tolerance)
     error = std::max(error, tolerance * farthest * farthest);
     if (mover->rigid.is_prescribed() || is_falling(*mover))
       continue;
-    mover->scale = std::max({mover->scale, 1e-6 * h,
-                             2. * reach(*mover, mover->moved + mover->displacement)});
+    mover->scale = std::max({mover->scale, 1e-6 * h, 2. * reach(*mover, mover->moved + mover->displacement)});
     const Generalised difference = mover->displacement - stage.dt * mover->first_rate;
     error = std::max(error, reach(*mover, difference) / mover->scale);
   }
@@ -429,8 +428,7 @@ void ImplicitContact<dim>::book_work(const TimeLevel &level, const double share,
       continue;
     for (unsigned int d = 0; d < dim; ++d) {
       // Guides bear what is not free.
-      const double external =
-          mover->rigid.is_free(d) ? mover->weight(gravity)[d] : -mover->force[d];
+      const double external = mover->rigid.is_free(d) ? mover->weight(gravity)[d] : -mover->force[d];
       book.impulse[d] += share * dt * external;
       book.gross_impulse += share * dt * std::abs(external);
       if (!mover->rigid.is_free(d))

@@ -21,21 +21,21 @@ struct ImplicitContact<dim>::Mover
   double radius;          ///< that rotations are measured with [m]
   bool may_touch = false; ///< some contact names it
 
-  Generalised displacement;         ///< since t_n: [m], [rad]
-  Generalised start;                ///< motion at t_n
-  Generalised first_rate;           ///< of the stage before
-  Generalised rate;                 ///< of the last stage that was booked
+  Generalised displacement; ///< since t_n: [m], [rad]
+  Generalised start;        ///< motion at t_n
+  Generalised first_rate;   ///< of the stage before
+  Generalised rate;         ///< of the last stage that was booked
   Generalised rate_history, acceleration_history;
-  Generalised step;                 ///< of the last iteration
-  Generalised moved;                ///< since it entered
-  double scale = 0.;                ///< largest way so far, twice [m]
+  Generalised step;  ///< of the last iteration
+  Generalised moved; ///< since it entered
+  double scale = 0.; ///< largest way so far, twice [m]
 
-  Generalised force;                ///< of contact on it, about the centre [N], [N m]
-  Generalised force_sum;            ///< of the step
-  Generalised residual;             ///< what it lacks for balance
-  double imbalance = 0.;            ///< its norm [N]
-  double force_scale = 0.;          ///< of all forces on it [N]
-  unsigned int n_closed = 0;        ///< sites that touch it
+  Generalised force;         ///< of contact on it, about the centre [N], [N m]
+  Generalised force_sum;     ///< of the step
+  Generalised residual;      ///< what it lacks for balance
+  double imbalance = 0.;     ///< its norm [N]
+  double force_scale = 0.;   ///< of all forces on it [N]
+  unsigned int n_closed = 0; ///< sites that touch it
 
   // Of the matrix: force on it and on the unknowns by each other's motion.
   bool is_coupled = false;
@@ -53,17 +53,17 @@ struct ImplicitContact<dim>::Place
   unsigned int n = 0; ///< nodes that carry it
   std::array<double, 3> weight{};
   std::array<std::array<Index, dim>, 3> unknown;
-  Vector free;          ///< 1 in components in which some node is free, else 0
-  double gap = 0.;      ///< at the start of the step, not negative [m]
-  double penalty = 0.;  ///< [N/m]
-  Vector multiplier;    ///< force on the bodies [N]
-  Vector force;         ///< the same, with what the present gap adds
-  bool is_known = false; ///< an earlier stage of the step has found it
+  Vector free;                        ///< 1 in components in which some node is free, else 0
+  double gap = 0.;                    ///< at the start of the step, not negative [m]
+  double penalty = 0.;                ///< [N/m]
+  Vector multiplier;                  ///< force on the bodies [N]
+  Vector force;                       ///< the same, with what the present gap adds
+  bool is_known = false;              ///< an earlier stage of the step has found it
   Vector known_force, known_relative; ///< there
-  Vector relative;      ///< displacement of the bodies' surface less that of the rigid one [m]
+  Vector relative;                    ///< displacement of the bodies' surface less that of the rigid one [m]
   ContactMode mode = ContactMode::sticks;
   dealii::Tensor<2, dim> tangent; ///< minus the force's derivative with `relative` [N/m]
-  Vector slip;          ///< direction of the friction on the bodies; where it slides
+  Vector slip;                    ///< direction of the friction on the bodies; where it slides
   // That the matrix knows.
   ContactMode matrix_mode = ContactMode::open;
   Vector matrix_slip;

@@ -154,8 +154,8 @@ void ImplicitContact<dim>::evaluate(const StepState &state)
         own = &sums[n_common + m * n_own];
     for (Place &place : touch->places) {
       const ContactSite<dim> &site = touch->sites[place.site];
-      const Vector relative = displacement(place, state.unknown.block(0)) -
-                              mover.rigid.velocity_at(site.x, mover.displacement);
+      const Vector relative =
+          displacement(place, state.unknown.block(0)) - mover.rigid.velocity_at(site.x, mover.displacement);
       respond(*touch, site, place, relative, fluid_force(*touch, site, state));
       const Generalised wrench = mover.rigid.wrench(place.force, site.x);
       for (unsigned int i = 0; i < n_motions; ++i)

@@ -82,7 +82,7 @@ void RigidSites<dim>::find(const ActiveNodes<dim> &nodes, const std::function<bo
 
 template <int dim>
 void RigidSites<dim>::find_gaps(const ActiveNodes<dim> &nodes,
-                               const std::function<bool(std::uint32_t)> &has_mass)
+                                const std::function<bool(std::uint32_t)> &has_mass)
 {
   constexpr double far = ContactSite<dim>::far;
   const auto &points = near.points();

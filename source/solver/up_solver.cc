@@ -470,38 +470,6 @@ void UpSolver<dim>::line_search(const TimeLevel &level, const double before)
 }
 
 template <int dim>
-void UpSolver<dim>::project_start()
-{
-  // Nodal pressures from the points': with no rates and no loads the storage term says (S p_n)_i = sum V p N
-  // / Q.
-  second = 0.;
-  if (!unknowns.has_pressure())
-    return;
-  TimeLevel level = this->level(now, 0.);
-  level.share = 0.;
-  level.pressure_rate = 1.;
-  level.acceleration = 1.;
-  level.seepage_inertia = false;
-  unknown = 0.;
-  state.rate_history = 0.;
-  state.second_history = 0.;
-  residual = 0.;
-  matrix = 0.;
-  share_unknown();
-  const UpSystem system{boundary.unused(), residual, gross, &matrix};
-  for (const auto &body : scene.bodies)
-    form->assemble(*body, level, state, {}, 0., system);
-  residual.compress(dealii::VectorOperation::add);
-  residual.block(0) = 0.;
-  fill_empty_diagonal(level);
-  prepare_linear_solver(level, false, false);
-  matrix_is_valid = matrix_is_near = false;
-  correction = 0.;
-  linear_solver.solve(correction, residual);
-  second.block(1) = correction.block(1);
-}
-
-template <int dim>
 void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
 {
   share_unknown();

@@ -17,6 +17,38 @@ const double stage_share = 1. - std::sqrt(0.5);
 } // namespace
 
 template <int dim>
+void UpSolver<dim>::project_start()
+{
+  // Nodal pressures from the points': with no rates and no loads the storage term says (S p_n)_i = sum V p N
+  // / Q.
+  second = 0.;
+  if (!unknowns.has_pressure())
+    return;
+  TimeLevel level = this->level(now, 0.);
+  level.share = 0.;
+  level.pressure_rate = 1.;
+  level.acceleration = 1.;
+  level.seepage_inertia = false;
+  unknown = 0.;
+  state.rate_history = 0.;
+  state.second_history = 0.;
+  residual = 0.;
+  matrix = 0.;
+  share_unknown();
+  const UpSystem system{boundary.unused(), residual, gross, &matrix};
+  for (const auto &body : scene.bodies)
+    form->assemble(*body, level, state, {}, 0., system);
+  residual.compress(dealii::VectorOperation::add);
+  residual.block(0) = 0.;
+  fill_empty_diagonal(level);
+  prepare_linear_solver(level, false, false);
+  matrix_is_valid = matrix_is_near = false;
+  correction = 0.;
+  linear_solver.solve(correction, residual);
+  second.block(1) = correction.block(1);
+}
+
+template <int dim>
 void UpSolver<dim>::solve_static()
 {
   if (unknowns.has_pressure() && !boundary.prescribes_pressure())
@@ -467,6 +499,7 @@ void UpSolver<dim>::reset_displacements()
 #define PEAT_INSTANTIATE(dim)                                                                                \
   template void UpSolver<dim>::set_horizontal_stress(double);                                                \
   template void UpSolver<dim>::reset_displacements();                                                        \
+  template void UpSolver<dim>::project_start();                                                              \
   template void UpSolver<dim>::solve_static();                                                               \
   template void UpSolver<dim>::start(Mode);                                                                  \
   template StableStep UpSolver<dim>::suggested_step() const;                                                 \

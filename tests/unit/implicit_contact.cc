@@ -23,16 +23,19 @@ struct Pressed
   {
     const bool flat = dim == 2;
     std::ostringstream text;
-    text << "set Dimension = " << dim << "\nset Scheme = implicit\nset Gravity = " << (flat ? "0, -10" : "0, 0, -10")
+    text << "set Dimension = " << dim
+         << "\nset Scheme = implicit\nset Gravity = " << (flat ? "0, -10" : "0, 0, -10")
          << "\nsubsection Grid\n set Lower corner = " << (flat ? "0, 0" : "0, 0, 0")
-         << "\n set Upper corner = " << (flat ? "2, 2" : "2, 2, 2") << "\n set Cells = " << (flat ? "8, 8" : "5, 5, 8")
+         << "\n set Upper corner = " << (flat ? "2, 2" : "2, 2, 2")
+         << "\n set Cells = " << (flat ? "8, 8" : "5, 5, 8")
          << "\nend\nsubsection Materials\n subsection soil\n set Density = 2000\n end\nend\n"
          << "subsection Bodies\n subsection ground\n set Material = soil\n set Shape = box("
          << (flat ? "0.2, 0, 1.8, 0.9" : "0.3, 0.3, 0, 1.7, 1.7, 0.9") << ")\n end\nend\n"
          << "subsection Rigid bodies\n subsection block\n set Shape = box("
          << (flat ? "0.5, 0.9, 1.3, 1.5" : "0.5, 0.5, 0.9, 1.3, 1.3, 1.5") << ")\n"
-         << (prescribed ? " set Motion = prescribed\n set Velocity = " + std::string(flat ? "1, -1" : "1, 0.5, -1")
-                        : std::string(" set Motion = free\n set Density = 2000"))
+         << (prescribed
+                 ? " set Motion = prescribed\n set Velocity = " + std::string(flat ? "1, -1" : "1, 0.5, -1")
+                 : std::string(" set Motion = free\n set Density = 2000"))
          << "\n end\nend\nsubsection Contacts\n subsection c\n set Bodies = block, ground\n set Law = " << law
          << "\n end\nend\nsubsection Stages\n subsection s\n set Duration = 1\n end\nend\n";
     write_file("implicit_contact.prm", text.str());
@@ -57,7 +60,8 @@ struct Pressed
     contact->match_nodes(*nodes, free);
 
     dealii::BlockDynamicSparsityPattern pattern(space->relevant());
-    contact->for_each_coupling([&](const auto &list) { free.add_entries_local_to_global(list, pattern, true); });
+    contact->for_each_coupling(
+        [&](const auto &list) { free.add_entries_local_to_global(list, pattern, true); });
     for (const auto index : space->owned()[0])
       pattern.add(index, index);
     matrix.reinit(space->owned(), pattern, comm);
@@ -147,8 +151,9 @@ void check_derivative(const std::string &law)
 
 BOOST_AUTO_TEST_CASE(derivatives)
 {
-  for (const std::string law : {"frictionless", "stick", "tied", "coulomb\n set Friction = 0.3",
-                                "coulomb\n set Friction = 100", "adhesive\n set Adhesion = 1e3\n set Friction = 0.3"}) {
+  for (const std::string law :
+       {"frictionless", "stick", "tied", "coulomb\n set Friction = 0.3", "coulomb\n set Friction = 100",
+        "adhesive\n set Adhesion = 1e3\n set Friction = 0.3"}) {
     BOOST_TEST_CONTEXT(law)
     {
       check_derivative<2>(law);
@@ -179,7 +184,8 @@ BOOST_AUTO_TEST_CASE(action_and_reaction)
   BOOST_TEST(state.gap < 0.);
   // What the block does and what the ground takes differ by the friction.
   BOOST_TEST(book.contact_dissipation > 0.);
-  BOOST_TEST((Ledger<3>(book).impulse - Pressed<3>::dt * on_ground).norm() <= 1e-12 * Pressed<3>::dt * on_ground.norm());
+  BOOST_TEST((Ledger<3>(book).impulse - Pressed<3>::dt * on_ground).norm() <=
+             1e-12 * Pressed<3>::dt * on_ground.norm());
 }
 
 BOOST_AUTO_TEST_CASE(cover)

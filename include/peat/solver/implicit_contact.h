@@ -142,13 +142,13 @@ private:
   TimeLevel stage;
   Vector gravity; ///< [m/s^2]
   double step_start = 0.;
-  double earlier_share = 0.;     ///< weight of the stage before in the step over that of this one
-  bool is_first_stage = false;   ///< the next one
-  bool predicting = false;       ///< the stage has no solution yet
-  bool tangent_changed = false;  ///< since the matrix was made
-  bool responses_known = false;  ///< the movers' `response` belongs to the matrix
-  double guessed = 0.;           ///< forces beyond the multipliers: root of the sum of squares [N]
-  double multiplier_norm = 0.;   ///< [N]
+  double earlier_share = 0.;    ///< weight of the stage before in the step over that of this one
+  bool is_first_stage = false;  ///< the next one
+  bool predicting = false;      ///< the stage has no solution yet
+  bool tangent_changed = false; ///< since the matrix was made
+  bool responses_known = false; ///< the movers' `response` belongs to the matrix
+  double guessed = 0.;          ///< forces beyond the multipliers: root of the sum of squares [N]
+  double multiplier_norm = 0.;  ///< [N]
 };
 
 template <int dim>

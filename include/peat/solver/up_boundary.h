@@ -15,8 +15,8 @@ namespace peat {
 ///
 /// On faces of the mesh nothing passes unless a condition says so. On a saturated body's own surface, where
 /// no other saturated body lies behind it, the pressure is zero unless a condition says otherwise: prescribed
-/// at nodes where the surface runs along a face of cells, and by a penalty where it cuts cells. Where a rigid body lies on it, the
-/// contact says what the fluid meets.
+/// at nodes where the surface runs along a face of cells, and by a penalty where it cuts cells. Where a rigid
+/// body lies on it, the contact says what the fluid meets.
 template <int dim>
 class UpBoundary
 {
