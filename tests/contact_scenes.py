@@ -387,8 +387,9 @@ def i1_3d(c):
     i1_case(c, "I1_3d", 1e-5, {}, 4. * h * h, h)
 
 
-def i2_errors(c, scene, k, cells, settings, area, axis="y"):
-    """Largest errors of velocity and averaged force, over v0 and Z_u v0, until shortly before the block lifts off."""
+def i2_errors(c, scene, k, cells, settings, area, axis="y", begin=3.):
+    """Largest errors of velocity and averaged force, over v0 and Z_u v0, until shortly before the block lifts off. Of the force from when the
+    front has passed `begin` cells."""
     table = read_table(os.path.join(TABLES, "I2_rigid_on_column.csv"))
     column = "K=0" if k < 1e-9 else "k=%g" % k
     known_v, known_f = table["V(%s) [m/s]" % column], table["F(%s) [Pa]" % column]
@@ -401,7 +402,7 @@ def i2_errors(c, scene, k, cells, settings, area, axis="y"):
     # Until shortly before the front comes back from the base: the mesh and averages blur it, and the inverse transform rings.
     v_error = max(abs(-v - interpolate(t, times, v_of)) for t, v in zip(s.t, speed) if t < min(17. / C_U, 0.95 * lost))
     f_error = max(abs(f / area(h) - interpolate(t, times, f_of)) / Z_U for t, f in s.averaged(2. * h / C_U)
-                  if 3. * h / C_U < t < 17. / C_U)
+                  if begin * h / C_U < t < 17. / C_U)
     return run, v_error, f_error
 
 

@@ -143,14 +143,15 @@ def incline(c):
 
 # ------------------------------------------------------------------------------------------------------------ impact
 def i2(c):
-    """Steps in which the undrained wave passes a quarter of a cell follow the front; longer ones only what is behind it."""
+    """Steps in which the undrained wave passes a quarter of a cell follow the front. Consistent masses blur it over some cells, where
+    the force comes up to the exact one: 5 % are missing after three cells, a tenth of a percent after twenty."""
     for k in (1e-12, 1e-5, 1e-4, 1e-3):
         settings = dict(IMPLICIT, **{STEP: "0.25*h/c_u"})
-        run, v_error, f_error = i2_errors(c, "I2_rigid_on_column", k, 80, settings, lambda h: h)
+        run, v_error, f_error = i2_errors(c, "I2_rigid_on_column", k, 80, settings, lambda h: h, begin=6.)
         name = "k = %g: " % k
         c.below(name + "velocity", v_error, 2e-2)
-        # Without any flow nothing damps what follows the front.
-        c.below(name + "force", f_error, 4e-2 if k > 1e-9 else 8e-2)
+        # Without flow nothing damps what rings behind the front.
+        c.below(name + "force", f_error, 4e-2 if k > 1e-9 else 6e-2)
         c.below(name + "balance of momentum", run.summary["balance"]["momentum"], 1e-7)
 
 
