@@ -13,7 +13,9 @@ ContactParameters<dim>::ContactParameters(Section section, const std::vector<std
   std::string interface_text = "impermeable", normal_text = "automatic";
   std::vector<double> vector(dim, 0.);
   vector[dim - 1] = 1.;
-  section.add("Bodies", bodies, "Two names of 'Bodies' or 'Rigid bodies', not two of the latter.");
+  section.add("Bodies", bodies,
+              "Two names of 'Bodies' or 'Rigid bodies', not two of the latter. In implicit and quasi-static "
+              "stages contacts of a rigid body act; two deformable bodies are tied where they meet.");
   law = make_contact_law(section);
   section.add("Interface", interface_text, {"impermeable", "drained"},
               "What pore fluid meets at the interface: no flow through it, or a given pressure.");

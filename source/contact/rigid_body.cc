@@ -276,6 +276,21 @@ typename RigidBody<dim>::Matrix RigidBody<dim>::inverse_mass() const
 }
 
 template <int dim>
+typename RigidBody<dim>::Matrix RigidBody<dim>::mass_matrix() const
+{
+  Matrix result;
+  if (parameters.prescribed)
+    return result;
+  const auto rotational = inertia();
+  for (unsigned int d = 0; d < dim; ++d)
+    result[d][d] = total_mass;
+  for (unsigned int r = 0; r < n_rotations; ++r)
+    for (unsigned int s = 0; s < n_rotations; ++s)
+      result[dim + r][dim + s] = rotational[r][s];
+  return result;
+}
+
+template <int dim>
 dealii::Tensor<2, dim> RigidBody<dim>::mobility(const dealii::Point<dim> &x1,
                                                 const dealii::Point<dim> &x2) const
 {
@@ -355,7 +370,7 @@ void RigidBody<dim>::end_step()
   if (!has_impulse)
     center_now -= 0.5 * step_length * gravity_change;
   if (dim == 2 || parameters.prescribed)
-    turn(step_length);
+    turn(step_length * spin_now);
   else {
     // Short enough for the iteration in turn_freely() to converge fast.
     constexpr double largest_angle = 0.1;
@@ -366,13 +381,28 @@ void RigidBody<dim>::end_step()
 }
 
 template <int dim>
-void RigidBody<dim>::turn(const double dt)
+void RigidBody<dim>::move(const Generalised &displacement, const Generalised &motion)
 {
-  angle += dt * spin_now;
+  Rotational by;
+  for (unsigned int r = 0; r < n_rotations; ++r) {
+    by[r] = displacement[dim + r];
+    spin_now[r] = motion[dim + r];
+  }
+  for (unsigned int d = 0; d < dim; ++d) {
+    center_now[d] += displacement[d];
+    center_velocity[d] = motion[d];
+  }
+  turn(by);
+}
+
+template <int dim>
+void RigidBody<dim>::turn(const Rotational &by)
+{
+  angle += by;
   if constexpr (dim == 2)
     turned = rotation_by(angle);
   else
-    turned = orthonormal<dim>(rotation_by(dt * spin_now) * turned);
+    turned = orthonormal<dim>(rotation_by(by) * turned);
 }
 
 template <int dim>
@@ -399,7 +429,7 @@ void RigidBody<dim>::turn_freely(const double dt)
     }
     turned = orthonormal(turned);
   } else
-    turn(dt);
+    turn(dt * spin_now);
 }
 
 template <int dim>

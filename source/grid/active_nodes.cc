@@ -202,6 +202,27 @@ void ActiveNodes<dim>::combine_over_ranks(double *data, const unsigned int n_com
     unpack(to_owners[s], buffers[s], false);
 }
 
+template <int dim>
+std::vector<NodeId> with_neighbours(const Grid<dim> &grid, const std::vector<NodeId> &nodes)
+{
+  std::vector<NodeId> result = nodes;
+  for (const NodeId node : nodes)
+    for (unsigned int d = 0; d < dim; ++d)
+      for (const int step : {-1, 1}) {
+        auto lattice = grid.node_lattice(node);
+        lattice[d] += step;
+        if (lattice[d] < 0 || lattice[d] > grid.n_cells(d))
+          continue;
+        if (const NodeId neighbour = grid.node_at(lattice); neighbour != no_index)
+          result.push_back(neighbour);
+      }
+  std::sort(result.begin(), result.end());
+  result.erase(std::unique(result.begin(), result.end()), result.end());
+  return result;
+}
+
 template class ActiveNodes<2>;
 template class ActiveNodes<3>;
+template std::vector<NodeId> with_neighbours<2>(const Grid<2> &, const std::vector<NodeId> &);
+template std::vector<NodeId> with_neighbours<3>(const Grid<3> &, const std::vector<NodeId> &);
 } // namespace peat

@@ -12,7 +12,8 @@ StageParameters::StageParameters(Section section, const Scheme common) : name(se
   section.add(
       "Solver", solver_name, {"dynamic", "quasi-static", "static"},
       "'dynamic': the full equations. 'quasi-static': without inertia, in steps as long as the pressures "
-      "change slowly. 'static': the state of equilibrium and of steady seepage under the loads at that "
+      "change slowly; free rigid bodies are in equilibrium with what they rest on. 'static': the state of "
+      "equilibrium and of steady seepage under the loads at that "
       "time.");
   solver = solver_name == "static"         ? Solver::static_state
            : solver_name == "quasi-static" ? Solver::quasi_static
@@ -422,12 +423,23 @@ std::string Case<dim>::why_not_semi_implicit() const
 }
 
 template <int dim>
+bool Case<dim>::concerns_rigid_body(const ContactParameters<dim> &contact) const
+{
+  return std::any_of(rigid_bodies.begin(), rigid_bodies.end(), [&](const auto &rigid) {
+    return rigid.name == contact.first || rigid.name == contact.second;
+  });
+}
+
+template <int dim>
 std::string Case<dim>::why_not_implicit(const StageParameters &stage) const
 {
-  if (!contacts.empty())
-    return "it does not go with 'Contacts' yet";
-  if (!rigid_bodies.empty())
-    return "rigid bodies do not act on it yet";
+  // Whether the force of an impact matters nobody but the user knows.
+  if (stage.scheme == Scheme::automatic && (!contacts.empty() || !rigid_bodies.empty()))
+    return "with 'Contacts' it is taken only where 'Scheme = implicit' asks for it";
+  for (const auto &contact : contacts)
+    if (!concerns_rigid_body(contact))
+      return "it ties deformable bodies where they meet, and does not go with 'Contacts' between them, as '" +
+             contact.name + "' is";
   if (std::max(scheme.local_damping, stage.local_damping) > 0.)
     return "it does not have 'Local damping'";
   if (scheme.grid_velocity || scheme.relaxation_time > 0.)

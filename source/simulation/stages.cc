@@ -20,15 +20,26 @@ void Simulation<dim>::run_stage(const StageParameters &stage, const double start
   note_scheme(implicit ? Scheme::implicit : chosen.scheme);
   const bool fits_steps = implicit && (parameters.method == Method::mpm || !dynamic);
   outputs->plan(parameters.output, comparison, recorder, start, start + stage.duration, fits_steps);
-  if (parameters.method == Method::mpm && implicit && !scene.contacts.empty())
-    log.line("stage '" + stage.name +
-             "': implicit, so bodies are tied where they meet, and rigid bodies do not act");
+  if (parameters.method == Method::mpm && implicit)
+    note_contacts(stage);
   if (stage.solver == StageParameters::Solver::static_state)
     run_static_stage(stage, start);
   else if (implicit)
     run_implicit_stage(stage, start);
   else
     run_explicit_stage(stage, start, chosen);
+}
+
+template <int dim>
+void Simulation<dim>::note_contacts(const StageParameters &stage)
+{
+  const bool deformable = std::any_of(scene.contacts.begin(), scene.contacts.end(), [&](const auto &contact) {
+    return !parameters.concerns_rigid_body(contact);
+  });
+  if (deformable)
+    log.line("stage '" + stage.name + "': implicit, so deformable bodies are tied where they meet");
+  if (!scene.rigid_bodies.empty() && stage.solver == StageParameters::Solver::static_state)
+    log.line("stage '" + stage.name + "': static, so rigid bodies do not act");
 }
 
 template <int dim>
@@ -178,12 +189,15 @@ void Simulation<dim>::run_implicit_stage(const StageParameters &stage, const dou
   up_solver->start(stage.solver == StageParameters::Solver::quasi_static ? Mode::quasi_static
                                                                          : Mode::dynamic);
   begin_stage(stage, up_solver->suggested_step());
+  ContactEvents<dim> events(log);
   double clock = seconds();
   while (now < end && !stopped) {
     const double event = std::min(end, outputs->next());
     steps.limit = up_solver->suggested_step().limit;
-    steps.add(up_solver->step(event));
+    const double dt = up_solver->step(event);
+    steps.add(dt);
     now = up_solver->time();
+    events.note(now, dt, scene);
     stopped = interrupted();
     const double lap = seconds();
     wall.time_loop += lap - clock;
@@ -197,6 +211,8 @@ void Simulation<dim>::run_implicit_stage(const StageParameters &stage, const dou
     log.progress(now / planned_end, now, steps.n_steps,
                  steps.n_steps * double(scene.n_global_points()) / std::max(1e-9, wall.time_loop));
   }
+  if (!scene.contact_states.empty())
+    events.summarise(scene);
   report_work();
 }
 

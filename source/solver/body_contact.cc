@@ -210,12 +210,12 @@ void BodyContact<dim>::find_surfaces()
     areas[1][s] = std::max(0., -g[1]);
     both_areas[s] = has_mass(sites[s]) ? areas[0][s] + areas[1][s] : 0.;
   }
-  this->find_lines(first.nodes(), &ContactSite<dim>::first, site_of_node, both_areas);
+  lines.find(first.nodes(), &ContactSite<dim>::first, site_of_node, both_areas, sites);
   for (ContactSite<dim> &site : sites)
     if (site.acts) {
       // The same weights in both bodies, so that equal and opposite impulses act at one place.
-      this->weigh(site, &ContactSite<dim>::first, both_areas, site.first_surface);
-      this->weigh(site, &ContactSite<dim>::second, both_areas, site.second_surface);
+      SiteLines<dim>::weigh(sites, site, &ContactSite<dim>::first, both_areas, site.first_surface);
+      SiteLines<dim>::weigh(sites, site, &ContactSite<dim>::second, both_areas, site.second_surface);
       double sum[2] = {0., 0.};
       for (const std::uint32_t other : site.line)
         if (other != no_index)

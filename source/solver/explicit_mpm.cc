@@ -37,25 +37,6 @@ std::string first_not_finite(const Scene<dim> &scene, const Grid<dim> &grid)
       }
   return "";
 }
-
-template <int dim>
-std::vector<NodeId> with_neighbours(const Grid<dim> &grid, const std::vector<NodeId> &nodes)
-{
-  std::vector<NodeId> result = nodes;
-  for (const NodeId node : nodes)
-    for (unsigned int d = 0; d < dim; ++d)
-      for (const int step : {-1, 1}) {
-        auto lattice = grid.node_lattice(node);
-        lattice[d] += step;
-        if (lattice[d] < 0 || lattice[d] > grid.n_cells(d))
-          continue;
-        if (const NodeId neighbour = grid.node_at(lattice); neighbour != no_index)
-          result.push_back(neighbour);
-      }
-  std::sort(result.begin(), result.end());
-  result.erase(std::unique(result.begin(), result.end()), result.end());
-  return result;
-}
 } // namespace
 
 template <int dim>

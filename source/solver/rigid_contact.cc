@@ -6,17 +6,14 @@
 
 namespace peat {
 namespace {
-/// Nodes are chosen this far from the rigid body's surface [cell sizes], and anew when it has moved by a part
-/// of it.
-constexpr double margin = 2.;
-constexpr double renewal = 0.5;
-/// A line of the mesh meets the rigid body if it does not pass it at more than this [cell sizes].
-constexpr double influence = 0.5 + 1e-9;
-/// Points that are less than this farther than the nearest one have a say in a node's normal [cell sizes].
-constexpr double normal_range = 0.25;
-/// By so much the gap of the nearest point may be less than the mean of those near it, and still count [cell
-/// sizes].
-constexpr double gap_slack = 0.02;
+template <int dim>
+std::vector<const Body<dim> *> bodies_of(const Scene<dim> &scene, const std::vector<std::size_t> &places)
+{
+  std::vector<const Body<dim> *> bodies;
+  for (const std::size_t b : places)
+    bodies.push_back(scene.bodies[b].get());
+  return bodies;
+}
 
 template <std::size_t n>
 void add_over_ranks(std::array<double, n> &values, MPI_Comm communicator)
@@ -29,10 +26,11 @@ void add_over_ranks(std::array<double, n> &values, MPI_Comm communicator)
 template <int dim>
 RigidContact<dim>::RigidContact(const ContactParameters<dim> &parameters, const SchemeParameters &scheme,
                                 const Grid<dim> &grid, const Scene<dim> &scene, RigidBody<dim> &rigid,
-                                Continuum<dim> &continuum, std::vector<std::size_t> bodies,
+                                Continuum<dim> &continuum, const std::vector<std::size_t> &bodies,
                                 const bool rigid_is_first, Generalised &tried_acceleration)
     : ContactPair<dim>(parameters, scheme, grid, scene), rigid(rigid), continuum(continuum),
-      bodies(std::move(bodies)), sign(rigid_is_first ? 1. : -1.), tried_acceleration(tried_acceleration)
+      sign(rigid_is_first ? 1. : -1.), tried_acceleration(tried_acceleration),
+      surface(grid, scheme.basis, rigid, bodies_of(scene, bodies), sites)
 {
   this->alpha = ContactPair<dim>::biot_coefficient(continuum, scene);
 }
@@ -40,51 +38,8 @@ RigidContact<dim>::RigidContact(const ContactParameters<dim> &parameters, const 
 template <int dim>
 void RigidContact<dim>::match_nodes()
 {
-  choose_nodes();
+  surface.choose(continuum.nodes());
   noted.reinit(continuum.nodes());
-}
-
-template <int dim>
-void RigidContact<dim>::choose_nodes()
-{
-  const ActiveNodes<dim> &nodes = continuum.nodes();
-  const double reach = margin * this->grid.smallest_cell_size();
-  const Bounds<dim> bounds = rigid.bounds();
-  sites.clear();
-  site_of_node.assign(nodes.size(), no_index);
-  for (std::uint32_t i = 0; i < nodes.size(); ++i) {
-    const auto &x = nodes.position(i);
-    bool inside = true;
-    for (unsigned int d = 0; d < dim; ++d)
-      inside = inside && x[d] > bounds.lower[d] - reach && x[d] < bounds.upper[d] + reach;
-    if (!inside || rigid.distance(x) > reach)
-      continue;
-    site_of_node[i] = sites.size();
-    ContactSite<dim> site;
-    site.second = i;
-    site.counts = nodes.is_owned(i);
-    sites.push_back(site);
-  }
-  std::vector<const Body<dim> *> pointers;
-  for (const std::size_t b : bodies)
-    pointers.push_back(this->scene.bodies[b].get());
-  near.choose(nodes, this->scheme.basis, pointers, site_of_node);
-  responses.resize(sites.size());
-  corners_of_choice = corners();
-}
-
-template <int dim>
-std::array<dealii::Point<dim>, (1u << dim)> RigidContact<dim>::corners() const
-{
-  const Bounds<dim> bounds = rigid.reference_shape().bounds();
-  std::array<dealii::Point<dim>, (1u << dim)> result;
-  for (unsigned int corner = 0; corner < (1u << dim); ++corner) {
-    dealii::Point<dim> x;
-    for (unsigned int d = 0; d < dim; ++d)
-      x[d] = (corner >> d) & 1 ? bounds.upper[d] : bounds.lower[d];
-    result[corner] = rigid.to_present(x);
-  }
-  return result;
 }
 
 template <int dim>
@@ -92,115 +47,19 @@ void RigidContact<dim>::begin(const double dt)
 {
   this->step_length = dt;
   this->now = {};
-  double moved = 0.;
-  const auto now_at = corners();
-  for (std::size_t corner = 0; corner < now_at.size(); ++corner)
-    moved = std::max(moved, now_at[corner].distance(corners_of_choice[corner]));
-  if (moved > renewal * this->grid.smallest_cell_size())
-    choose_nodes();
+  const ActiveNodes<dim> &nodes = continuum.nodes();
+  if (surface.is_outdated())
+    surface.choose(nodes);
   if (!this->parallel && sites.empty())
     return;
-  near.collect(continuum.nodes());
-  find_gaps();
-  find_surfaces();
+  surface.find(nodes, [&](const std::uint32_t node) { return continuum.mass(node) > 0.; });
+  responses.resize(sites.size());
   for (ContactSite<dim> &site : sites) {
     site.impulse = Vector();
     site.mode = ContactMode::open;
     if (site.acts)
       site.relative_velocity =
           rigid.velocity_at(site.x) - this->velocity(continuum.fields().velocity, site.second_surface);
-  }
-}
-
-template <int dim>
-void RigidContact<dim>::find_gaps()
-{
-  constexpr double far = ContactPair<dim>::far;
-  const ActiveNodes<dim> &nodes = continuum.nodes();
-  const auto &points = near.points();
-  normals.assign(points.size(), Vector());
-  distances.assign(points.size(), far);
-  for (std::size_t p = 0; p < points.size(); ++p)
-    if (points[p].depth > 0.) {
-      normals[p] = rigid.normal(points[p].x);
-      distances[p] = rigid.distance(points[p].x);
-    }
-
-  const std::size_t size = this->parallel ? nodes.size() : sites.size();
-  nearest.assign(size, -far);
-  for (const auto &entry : near.entries())
-    if (distances[entry.point] < far) {
-      const double gap = distances[entry.point] - points[entry.point].reach(normals[entry.point]);
-      double &value = nearest[index_of(sites[entry.site])];
-      value = std::max(value, -gap);
-    }
-  if (this->parallel)
-    nodes.max_over_ranks(nearest.data(), 1);
-
-  // Normal, place, and volume gradient.
-  sums.assign(size * n_columns, 0.);
-  const double range = normal_range * this->grid.smallest_cell_size();
-  for (const auto &entry : near.entries()) {
-    double *sum = values_of(sites[entry.site]);
-    const auto &point = points[entry.point];
-    for (unsigned int d = 0; d < dim; ++d)
-      sum[1 + 2 * dim + d] += point.volume * entry.dN[d];
-    if (distances[entry.point] == far)
-      continue;
-    const Vector &n = normals[entry.point];
-    const double gap = distances[entry.point] - point.reach(n);
-    const double w = entry.N * std::max(0., 1. - (gap + nearest[index_of(sites[entry.site])]) / range);
-    sum[0] += w;
-    for (unsigned int d = 0; d < dim; ++d) {
-      sum[1 + d] += w * n[d];
-      sum[1 + dim + d] += w * (point.x[d] - distances[entry.point] * n[d]);
-    }
-    sum[1 + 3 * dim] += w * gap;
-  }
-  if (this->parallel)
-    nodes.sum_over_ranks(sums.data(), n_columns);
-  for (ContactSite<dim> &site : sites) {
-    const double *sum = values_of(site);
-    site.gap = far;
-    site.normal = Vector();
-    if (!(sum[0] > 0.) || continuum.mass(site.second) == 0.)
-      continue;
-    for (unsigned int d = 0; d < dim; ++d) {
-      site.normal[d] = sum[1 + d];
-      site.x[d] = sum[1 + dim + d] / sum[0];
-    }
-    if (site.normal.norm() == 0.)
-      continue;
-    site.normal /= site.normal.norm();
-    // The least gap of all points that reach the node would be that of a surface which is in contact beside
-    // it: a wheel would be held by the ground ahead of it. Within the slack it counts, as of flat surfaces.
-    const double least = -nearest[index_of(site)], mean = sum[1 + 3 * dim] / sum[0];
-    site.gap = least + std::max(0., mean - least - gap_slack * this->grid.smallest_cell_size());
-  }
-}
-
-template <int dim>
-void RigidContact<dim>::find_surfaces()
-{
-  const ActiveNodes<dim> &nodes = continuum.nodes();
-  areas.resize(sites.size());
-  for (std::size_t s = 0; s < sites.size(); ++s) {
-    // sum V grad N points out of the body.
-    Vector gradient;
-    for (unsigned int d = 0; d < dim; ++d)
-      gradient[d] = values_of(sites[s])[1 + 2 * dim + d];
-    areas[s] = std::max(0., -(gradient * sites[s].normal));
-  }
-  this->find_lines(nodes, &ContactSite<dim>::second, site_of_node, areas);
-  for (ContactSite<dim> &site : sites) {
-    if (!site.acts)
-      continue;
-    site.area = this->weigh(site, &ContactSite<dim>::second, areas, site.second_surface);
-    dealii::Point<dim> crossing;
-    for (unsigned int k = 0; k < 3; ++k)
-      if (site.second_surface.weight[k] > 0.)
-        crossing += site.second_surface.weight[k] * Vector(nodes.position(site.second_surface.node[k]));
-    site.acts = rigid.distance(crossing) <= influence * this->grid.smallest_cell_size();
   }
 }
 

@@ -50,8 +50,9 @@ CellId cell_behind(const SurfacePoint<dim> &point, const Space<dim> &space)
 } // namespace
 
 template <int dim>
-UpBoundary<dim>::UpBoundary(const Space<dim> &space, const Scene<dim> &scene, const double penalty)
-    : space(space), grid(space.grid()), scene(scene), penalty(penalty)
+UpBoundary<dim>::UpBoundary(const Space<dim> &space, const Scene<dim> &scene,
+                            const ImplicitContact<dim> &contact, const double penalty)
+    : space(space), grid(space.grid()), scene(scene), contact(contact), penalty(penalty)
 {}
 
 template <int dim>
@@ -141,6 +142,7 @@ void UpBoundary<dim>::find_pieces(const ActiveNodes<dim> &active)
       piece.body = &scene.body(name);
       piece.cell = cell_behind(point, space);
       carry(active, piece);
+      piece.cover = contact.cover(*piece.body, point.position);
       if (piece.body->material().mixture() && space.has_pressure() && piece.cell != no_index &&
           space.is_saturated(piece.cell))
         find_pressure(piece);
@@ -170,9 +172,28 @@ void UpBoundary<dim>::carry(const ActiveNodes<dim> &active, Piece &piece) const
 }
 
 template <int dim>
+bool UpBoundary<dim>::cover_changes() const
+{
+  if (contact.is_empty())
+    return false;
+  int changes = 0;
+  auto piece = pieces.begin();
+  for (const auto &[name, tracers] : scene.surfaces)
+    for (const auto &tracer : tracers.tracers()) {
+      changes |= contact.cover(*piece->body, tracer.position) != piece->cover;
+      ++piece;
+    }
+  return dealii::Utilities::MPI::max(changes, grid.communicator()) > 0;
+}
+
+template <int dim>
 bool UpBoundary<dim>::is_covered(Piece &piece) const
 {
   using Interface = typename ContactParameters<dim>::Interface;
+  if (piece.cover) {
+    piece.otherwise = piece.cover->pressure;
+    return piece.cover->interface == Interface::impermeable;
+  }
   dealii::Point<dim> beyond = piece.point.initial_position;
   beyond += 1e-4 * grid.smallest_cell_size() / piece.point.area.norm() * piece.point.area;
   for (const auto &body : scene.bodies) {

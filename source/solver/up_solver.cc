@@ -57,7 +57,7 @@ UpSolver<dim>::UpSolver(const ImplicitParameters &parameters, const LinearSolver
       active(grid, displacement == Nodes::gimp ? 4 : 2),
       // What is to rest under the explicit step must be in equilibrium without the projection.
       form(UpForm<dim>::make(unknowns, method != Method::points_at_rest)), small_nodes(unknowns),
-      boundary(unknowns, scene, parameters.surface_penalty),
+      contact(unknowns, scene), boundary(unknowns, scene, contact, parameters.surface_penalty),
       linear_solver(linear_parameters, "an implicit step"), now(start_time), book(carried)
 {}
 
@@ -84,6 +84,7 @@ void UpSolver<dim>::prepare()
   sort(saturated);
   unknowns.distribute(solid, saturated);
   active.rebuild(solid);
+  contact.share_nodes(solid, active);
   for (auto &[name, tracers] : scene.surfaces) {
     if (method != Method::finite_elements)
       tracers.settle(scene.body(name), active);
@@ -91,6 +92,7 @@ void UpSolver<dim>::prepare()
   }
   survey_nodes();
   boundary.locate(active, small_nodes.unused());
+  contact.match_nodes(active, boundary.constraints());
   resize();
   project_start();
 }
@@ -135,6 +137,9 @@ void UpSolver<dim>::resize()
         boundary.constraints().add_entries_local_to_global(list, pattern, true);
       }
     });
+  contact.for_each_coupling([&](const auto &coupled) {
+    boundary.constraints().add_entries_local_to_global(coupled, pattern, true);
+  });
   dealii::IndexSet owned(unknowns.n_unknowns()), relevant(unknowns.n_unknowns());
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
     owned.add_indices(unknowns.owned()[b], b * unknowns.first_pressure());
@@ -327,6 +332,7 @@ void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
     form->assemble(*body, level, state, loads, stabilisation, system);
   boundary.assemble(level, state, residual, with_matrix ? &matrix : nullptr);
   small_nodes.assemble(level, state, boundary.constraints(), residual, with_matrix ? &matrix : nullptr);
+  contact.assemble(level, state, system);
   residual.compress(dealii::VectorOperation::add);
   right_side = residual;
   boundary.constraints().set_zero(right_side);
@@ -367,7 +373,7 @@ void UpSolver<dim>::share_unknown()
 template <int dim>
 bool UpSolver<dim>::needs_matrix(const TimeLevel &level) const
 {
-  return !matrix_is_valid || !linear || !same(level, matrix_level);
+  return !matrix_is_valid || !linear || contact.changes_matrix() || !same(level, matrix_level);
 }
 
 template <int dim>
@@ -395,38 +401,54 @@ void UpSolver<dim>::solve(const TimeLevel &level, const double start, const doub
   boundary.prescribe(start, end, unknown);
   for (unsigned int iteration = 0;; ++iteration) {
     // Of a linear problem the matrix is needed once, at the first residual.
-    const bool with_matrix = iteration == 0 ? needs_matrix(level) : !linear;
+    const bool with_matrix = iteration == 0 ? needs_matrix(level) : !linear || contact.changes_matrix();
     assemble(level, with_matrix);
     for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
       const double scale = std::abs(b == 1 ? level.fluid_scale() : 1.);
       // Forces and volumes that hold the prescribed unknowns belong to the scale, too.
-      const double size = (iteration == 0 ? right_side : residual).block(b).l2_norm();
+      double size = (iteration == 0 ? right_side : residual).block(b).l2_norm();
+      if (b == 0)
+        size = contact.residual_scale(size);
       if (b == 1 && iteration == 0)
         residual_scale[1] *= scale / fluid_scale_before;
       residual_scale[b] = std::max(residual_scale[b], size);
     }
     fluid_scale_before = std::abs(level.fluid_scale());
-    if ((iteration > 0 && converged(tolerance)) || right_side.l2_norm() == 0.)
+    if (((iteration > 0 && converged(tolerance)) || right_side.l2_norm() == 0.) &&
+        contact.is_balanced(tolerance))
       return;
-    if (!std::isfinite(right_side.l2_norm()) || iteration >= parameters.newton_iterations) {
-      std::ostringstream text;
-      text << "the equations of the step from t = " << start << " s to " << end << " s have "
-           << (std::isfinite(right_side.l2_norm()) ? "not been solved" : "no finite solution") << " after "
-           << iteration << " iterations (residual of momentum " << residual_norm(0, tolerance);
-      if (unknowns.has_pressure())
-        text << ", of fluid mass " << residual_norm(1, tolerance);
-      text << "); use shorter steps, or more 'Newton iterations'";
-      throw NumericalError(text.str());
-    }
+    if (!std::isfinite(right_side.l2_norm()) ||
+        iteration >= parameters.newton_iterations + contact.extra_iterations())
+      give_up(iteration, start, end, tolerance);
     correction = 0.;
-    done.linear_iterations += linear_solver.solve(correction, right_side);
-    boundary.constraints().set_zero(correction);
-    ++done.linear_solves;
+    const auto solve_system = [&](BlockVector &solution, const BlockVector &forces) {
+      done.linear_iterations += linear_solver.solve(solution, forces);
+      boundary.constraints().set_zero(solution);
+      ++done.linear_solves;
+    };
+    solve_system(correction, right_side);
+    contact.correct(level, correction, solve_system);
     ++done.newton_iterations;
     unknown += correction;
     if (!linear)
       line_search(level, right_side.l2_norm());
+    share_unknown();
+    contact.augment(state);
   }
+}
+
+template <int dim>
+void UpSolver<dim>::give_up(const unsigned int iterations, const double start, const double end,
+                            const double tolerance) const
+{
+  std::ostringstream text;
+  text << "the equations of the step from t = " << start << " s to " << end << " s have "
+       << (std::isfinite(right_side.l2_norm()) ? "not been solved" : "no finite solution") << " after "
+       << iterations << " iterations (residual of momentum " << residual_norm(0, tolerance);
+  if (unknowns.has_pressure())
+    text << ", of fluid mass " << residual_norm(1, tolerance);
+  text << contact.unbalanced() << "); use shorter steps, or more 'Newton iterations'";
+  throw NumericalError(text.str());
 }
 
 template <int dim>
@@ -438,43 +460,13 @@ void UpSolver<dim>::line_search(const TimeLevel &level, const double before)
   for (unsigned int k = 0; k < most_halvings; ++k) {
     assemble(level, false);
     const double after = right_side.l2_norm();
-    if (std::isfinite(after) && after <= before)
+    // Where sites touch or part it is the next iteration that knows their forces.
+    if (std::isfinite(after) && (after <= before || contact.changes_matrix()))
       return;
     length *= 0.5;
     unknown.add(-length, correction);
+    contact.retreat(length);
   }
-}
-
-template <int dim>
-void UpSolver<dim>::project_start()
-{
-  // Nodal pressures from the points': with no rates and no loads the storage term says (S p_n)_i = sum V p N
-  // / Q.
-  second = 0.;
-  if (!unknowns.has_pressure())
-    return;
-  TimeLevel level = this->level(now, 0.);
-  level.share = 0.;
-  level.pressure_rate = 1.;
-  level.acceleration = 1.;
-  level.seepage_inertia = false;
-  unknown = 0.;
-  state.rate_history = 0.;
-  state.second_history = 0.;
-  residual = 0.;
-  matrix = 0.;
-  share_unknown();
-  const UpSystem system{boundary.unused(), residual, gross, &matrix};
-  for (const auto &body : scene.bodies)
-    form->assemble(*body, level, state, {}, 0., system);
-  residual.compress(dealii::VectorOperation::add);
-  residual.block(0) = 0.;
-  fill_empty_diagonal(level);
-  prepare_linear_solver(level, false, false);
-  matrix_is_valid = matrix_is_near = false;
-  correction = 0.;
-  linear_solver.solve(correction, residual);
-  second.block(1) = correction.block(1);
 }
 
 template <int dim>
@@ -489,6 +481,7 @@ void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
     for (const auto &body : other->bodies)
       form->update_points(*body, level, state, ghosted_rate, false, all_finite);
   const double dt = level.dt;
+  contact.accept(dt);
   total += unknown;
   change += unknown;
   if (moved.size() > 0) {
@@ -583,7 +576,7 @@ void UpSolver<dim>::relocate_points()
   changed = dealii::Utilities::MPI::max(changed | leaves, grid.communicator());
   // Domains may reach nodes now that they did not reach before.
   if (!changed)
-    changed = reach_changes();
+    changed = reach_changes() || contact.is_outdated() || boundary.cover_changes();
   if (changed)
     prepare();
   else

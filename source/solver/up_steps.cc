@@ -17,6 +17,38 @@ const double stage_share = 1. - std::sqrt(0.5);
 } // namespace
 
 template <int dim>
+void UpSolver<dim>::project_start()
+{
+  // Nodal pressures from the points': with no rates and no loads the storage term says (S p_n)_i = sum V p N
+  // / Q.
+  second = 0.;
+  if (!unknowns.has_pressure())
+    return;
+  TimeLevel level = this->level(now, 0.);
+  level.share = 0.;
+  level.pressure_rate = 1.;
+  level.acceleration = 1.;
+  level.seepage_inertia = false;
+  unknown = 0.;
+  state.rate_history = 0.;
+  state.second_history = 0.;
+  residual = 0.;
+  matrix = 0.;
+  share_unknown();
+  const UpSystem system{boundary.unused(), residual, gross, &matrix};
+  for (const auto &body : scene.bodies)
+    form->assemble(*body, level, state, {}, 0., system);
+  residual.compress(dealii::VectorOperation::add);
+  residual.block(0) = 0.;
+  fill_empty_diagonal(level);
+  prepare_linear_solver(level, false, false);
+  matrix_is_valid = matrix_is_near = false;
+  correction = 0.;
+  linear_solver.solve(correction, residual);
+  second.block(1) = correction.block(1);
+}
+
+template <int dim>
 void UpSolver<dim>::solve_static()
 {
   if (unknowns.has_pressure() && !boundary.prescribes_pressure())
@@ -40,6 +72,8 @@ template <int dim>
 void UpSolver<dim>::start(const Mode stage_mode)
 {
   mode = stage_mode;
+  if (method == Method::material_points && contact.enter())
+    prepare();
   damped_steps_left = parameters.start_steps;
   next_step = 0.;
   first_step_done = false;
@@ -251,6 +285,8 @@ double UpSolver<dim>::runge_kutta_step(const double latest)
   std::ostringstream text;
   text << "no step after t = " << now << " s is accurate to 'Step tolerance', the last was " << dt
        << " s; loads that jump belong to the start of a stage";
+  if (!std::isfinite(error_before))
+    text << "; " << failure;
   throw NumericalError(text.str());
 }
 
@@ -293,7 +329,8 @@ double UpSolver<dim>::try_stages(const double dt)
     return find_stages(dt);
   try {
     return find_stages(dt);
-  } catch (const NumericalError &) {
+  } catch (const NumericalError &error) {
+    failure = error.what();
     matrix_is_valid = false;
     return std::numeric_limits<double>::infinity();
   }
@@ -311,6 +348,8 @@ double UpSolver<dim>::find_stages(const double dt)
   if (mode == Mode::dynamic && !linear)
     unknown.block(0).equ(g * dt, mean_velocity());
   TimeLevel level = stage_level(dt, false);
+  contact.begin_step(now);
+  contact.begin_stage(level, now, now + g * dt, 0., 0.);
   solve(level, now, now + g * dt, parameters.newton_tolerance);
 
   // k_1 = (Y_1 - y_n)/(g dt);  k_2 = (Y_2 - y_n)/(g dt) - (1 - g)/g k_1, of u and p, and of v, where v_2 is
@@ -331,6 +370,8 @@ double UpSolver<dim>::find_stages(const double dt)
     state.second_history = accelerations;
   }
   level = stage_level(dt, true);
+  contact.begin_stage(level, now, now + dt, -(1. - g) / g,
+                      mode == Mode::dynamic ? -2. * (1. - g) / (g * g * dt) : 0.);
   solve(level, now, now + dt, parameters.newton_tolerance);
 
   // Against the first-order y_n + dt k_1.
@@ -377,6 +418,7 @@ double UpSolver<dim>::estimated_error(const BlockVector &difference)
     change_scale[b] = std::max({change_scale[b], 2. * changes[b], least[b]});
     error = std::max(error, change_scale[b] > 0. ? errors[b] / change_scale[b] : 0.);
   }
+  error = std::max(error, contact.estimated_error(parameters.step_tolerance));
   // Points must not pass a cell.
   if (method == Method::material_points) {
     const double farthest = unknown.block(0).linfty_norm() / (0.5 * grid.smallest_cell_size());
@@ -402,6 +444,7 @@ void UpSolver<dim>::book_work(const TimeLevel &level, const double share,
   const auto held = boundary.reactions(level, residual, motion);
   const auto loads = boundary.loads(level, ghosted_motion.block(0));
   const double dt = share * level.dt;
+  contact.book_work(level, share, ghosted_motion.block(0), book);
   book.impulse += dt * (held.force + loads.force + weight);
   book.gross_impulse += dt * (held.gross_force + loads.gross_force + weight.norm());
   book.external_work += share * (held.work + loads.work + gravity_work);
@@ -456,6 +499,7 @@ void UpSolver<dim>::reset_displacements()
 #define PEAT_INSTANTIATE(dim)                                                                                \
   template void UpSolver<dim>::set_horizontal_stress(double);                                                \
   template void UpSolver<dim>::reset_displacements();                                                        \
+  template void UpSolver<dim>::project_start();                                                              \
   template void UpSolver<dim>::solve_static();                                                               \
   template void UpSolver<dim>::start(Mode);                                                                  \
   template StableStep UpSolver<dim>::suggested_step() const;                                                 \

@@ -106,6 +106,13 @@ public:
 
   /// Infinite if prescribed [kg], 2-D [kg/m].
   double mass() const { return total_mass; }
+  /// Impulse for a unit of each component of the motion, free or not; symmetric. Prescribed: zero.
+  Matrix mass_matrix() const;
+  /// Whether a component of the motion is free.
+  bool is_free(const unsigned int component) const
+  {
+    return !parameters.prescribed && parameters.is_free[component];
+  }
   /// Change of motion by a unit generalised impulse: symmetric, zero for what does not move freely.
   /// Prescribed: zero.
   Matrix inverse_mass() const;
@@ -134,6 +141,11 @@ public:
   /// translation is that of symplectic Euler, as the points' is.
   void end_step();
 
+  /// Move a free body, as an implicit step has found it.
+  /// @param displacement of the centre [m], and rotation vector [rad]
+  /// @param motion from now on
+  void move(const Generalised &displacement, const Generalised &motion);
+
   /// What bodies in contact exert on it, about its centre; set by the contact, for output [N], [N m].
   Vector last_force;
   Rotational last_moment;
@@ -147,7 +159,7 @@ private:
   dealii::Tensor<2, n_rotations> inertia() const;
   /// Inverse of the inertia as far as rotation is free.
   dealii::Tensor<2, n_rotations> inverse_inertia() const;
-  void turn(double dt);
+  void turn(const Rotational &by);
   void turn_freely(double dt);
 
   const RigidBodyParameters<dim> parameters;

@@ -100,4 +100,8 @@ private:
   std::vector<Share> from_others;
   mutable std::vector<std::vector<double>> buffers;
 };
+
+/// These nodes and those next to them along the lines of the mesh, as far as this rank knows them, ascending.
+template <int dim>
+std::vector<NodeId> with_neighbours(const Grid<dim> &grid, const std::vector<NodeId> &nodes);
 } // namespace peat

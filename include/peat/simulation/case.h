@@ -89,6 +89,8 @@ struct Case
 
   /// Name of the stage with which a body comes in, "" for those that are there from the start.
   std::string entry_stage(const BodyParameters<dim> &body) const;
+  /// Whether one of its two bodies is rigid.
+  bool concerns_rigid_body(const ContactParameters<dim> &contact) const;
   /// Numbers of the bodies that come in with this stage.
   std::vector<std::size_t> entering_bodies(const StageParameters &stage) const;
 

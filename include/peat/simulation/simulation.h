@@ -69,6 +69,8 @@ private:
   void run_implicit_stage(const StageParameters &stage, double start);
   void run_static_stage(const StageParameters &stage, double start);
   void bring_in_bodies(const StageParameters &stage);
+  /// Say what contacts mean in an implicit stage.
+  void note_contacts(const StageParameters &stage);
   void begin_stage(const StageParameters &stage, const StableStep &step);
   /// The scheme of a dynamic stage of material points, and what the log says of it. Collective.
   SchemeEstimate choose_scheme(const StageParameters &stage, double start);

@@ -71,6 +71,7 @@ private:
   std::array<std::vector<double>, 2> edge;  ///< how far a body reaches from the site towards the other [m]
   std::array<std::vector<double>, 2> areas; ///< of the interface, by site
   std::vector<double> both_areas;
+  SiteLines<dim> lines;
   std::array<NodalAdditions<dim>, 2> noted;
   SeparatingPlanes<dim> planes;
   std::vector<double> nodal_values; ///< scratch for sums over ranks

@@ -2,51 +2,11 @@
 
 #include <peat/contact/contact.h>
 #include <peat/contact/near_points.h>
+#include <peat/solver/contact_site.h>
 #include <peat/solver/continuum.h>
 #include <peat/solver/nodal_additions.h>
 
 namespace peat {
-/// How a continuum's surface moves at a contact site: with the mean velocity of neighbours on a line of the
-/// mesh, each weighted by the share of the surface that it carries. A pressure on the surface acts on them by
-/// the same shares.
-struct SurfaceNodes
-{
-  std::array<std::uint32_t, 3> node = {no_index, no_index, no_index};
-  std::array<double, 3> weight = {0., 0., 0.};
-};
-
-/// What surfaces do at a site: they are free, keep their distance, or move as one.
-enum class ContactMode { open, slides, sticks };
-
-/// A place at which two bodies may touch.
-template <int dim>
-struct ContactSite
-{
-  std::uint32_t first = no_index;  ///< the nearest node, of the first continuum; no_index of a rigid body
-  std::uint32_t second = no_index; ///< the same node, of the second continuum
-  bool counts = false;             ///< this rank handles it
-  bool acts = false;               ///< the interface is here
-  bool shares_line = false;        ///< a neighbour on its line carries as much
-  /// Places of the sites whose nodes move with this one's surface; itself first, no_index where there is
-  /// none.
-  std::array<std::uint32_t, 3> line;
-  SurfaceNodes first_surface, second_surface;
-  dealii::Point<dim> x;                     ///< where forces act
-  dealii::Tensor<1, dim> normal;            ///< from the first body to the second
-  double gap = 0.;                          ///< between their surfaces [m]; negative if they overlap
-  double area = 0.;                         ///< of the interface [m^(dim-1)]
-  double height = 0.;                       ///< of the interface above the nearest node, along the normal [m]
-  dealii::Tensor<1, dim> impulse;           ///< of this step, on the second body [N s]
-  dealii::Tensor<1, dim> relative_velocity; ///< of the first body, at the start of the step [m/s]
-  ContactMode mode = ContactMode::open;     ///< in which the impulse was found
-
-  // While pore pressures are solved for.
-  double normal_mass = 0.;         ///< force over relative acceleration along the normal [kg]
-  dealii::Tensor<1, dim> mass;     ///< the same in each direction; where the bodies move as one
-  bool closes_flux = false;        ///< no fluid passes
-  dealii::Tensor<1, dim> reaction; ///< to what is tried, on the second body [N]
-};
-
 /// The contact of two bodies during a step: where they may touch, and impulses that keep them from
 /// overlapping and from sliding as far as the law says (theory.md, contact).
 ///
@@ -99,7 +59,7 @@ public:
 
 protected:
   using Vector = dealii::Tensor<1, dim>;
-  static constexpr double far = std::numeric_limits<double>::max();
+  static constexpr double far = ContactSite<dim>::far;
 
   /// The impulse that the law allows.
   struct Response
@@ -116,18 +76,6 @@ protected:
   ///        per normal impulse [1/s]
   Response respond(const ContactSite<dim> &site, const Vector &relative, const Vector &compliance,
                    const std::pair<double, double> &fluid_force) const;
-
-  /// Of all sites with a gap and a normal, find those that act: one for each line of the mesh that meets the
-  /// interface, at the node that carries most of it; and the nodes of that line which carry the rest
-  /// (theory.md, contact). Each node belongs to one site at most.
-  /// @param nodes of one of the continua
-  /// @param node its numbers in the sites
-  /// @param areas of the interface, by site [m^(dim-1)]
-  void find_lines(const ActiveNodes<dim> &nodes, std::uint32_t ContactSite<dim>::*node,
-                  const std::vector<std::uint32_t> &site_of_node, const std::vector<double> &areas);
-  /// Weights by the areas that a continuum's nodes carry. Returns their sum.
-  double weigh(const ContactSite<dim> &site, std::uint32_t ContactSite<dim>::*node,
-               const std::vector<double> &areas, SurfaceNodes &surface) const;
 
   /// 1 / mass of a node, zero in components that a condition prescribes.
   static Vector node_compliance(const Continuum<dim> &continuum, std::uint32_t node);
@@ -184,8 +132,5 @@ protected:
 
   std::vector<ContactSite<dim>> sites;
   std::vector<std::uint32_t> held_sites; ///< of those that this rank handles
-
-private:
-  std::vector<std::uint32_t> owner_of_site; ///< the site whose line it is on
 };
 } // namespace peat

@@ -2,6 +2,7 @@
 
 #include <peat/contact/rigid_body.h>
 #include <peat/solver/contact_pair.h>
+#include <peat/solver/rigid_sites.h>
 
 namespace peat {
 /// Contact of a rigid body and the bodies of a continuum: at the continuum's nodes near the rigid body's
@@ -16,7 +17,7 @@ public:
   /// one for all contacts of the body
   RigidContact(const ContactParameters<dim> &parameters, const SchemeParameters &scheme,
                const Grid<dim> &grid, const Scene<dim> &scene, RigidBody<dim> &rigid,
-               Continuum<dim> &continuum, std::vector<std::size_t> bodies, bool rigid_is_first,
+               Continuum<dim> &continuum, const std::vector<std::size_t> &bodies, bool rigid_is_first,
                typename RigidBody<dim>::Generalised &tried_acceleration);
 
   void match_nodes() override;
@@ -41,41 +42,21 @@ private:
   using ContactPair<dim>::sites;
   using ContactPair<dim>::held_sites;
 
-  void choose_nodes();
-  std::array<dealii::Point<dim>, (1u << dim)> corners() const;
-  void find_gaps();
-  void find_surfaces();
   /// Impulses at all sites if the rigid body moves like this; their wrench, and its derivatives with the
   /// motion, over all ranks.
   void respond_to(const Generalised &motion);
   void find_motion();
   void find_common_mobility();
   Generalised over_ranks(const Generalised &mine) const;
-  double *values_of(const ContactSite<dim> &site) { return &sums[std::size_t(index_of(site)) * n_columns]; }
-  /// Where the site's sums over ranks stand.
-  std::size_t index_of(const ContactSite<dim> &site) const
-  {
-    return this->parallel ? site.second : site_of_node[site.second];
-  }
 
   RigidBody<dim> &rigid;
   Continuum<dim> &continuum;
-  const std::vector<std::size_t> bodies;
   const double sign; ///< -1: reports are of the body, not of the rigid one
   Generalised &tried_acceleration;
 
-  std::vector<std::uint32_t> site_of_node;
-  NearPoints<dim> near;
-  /// Where the corners of the rigid body's box were when the nodes were chosen.
-  std::array<dealii::Point<dim>, (1u << dim)> corners_of_choice;
+  RigidSites<dim> surface;
 
   // Of a step, here to keep their memory.
-  std::vector<Vector> normals; ///< of the rigid body at the points near it
-  std::vector<double> distances;
-  std::vector<double> areas; ///< of the interface, by site
-  /// By index_of(): least distance of the body's points, negative; sums over them (see find_gaps()).
-  std::vector<double> nearest, sums;
-  static constexpr unsigned int n_columns = 2 + 3 * dim;
   std::vector<Response> responses;
   std::vector<double> wrench, slope;
   /// Acceleration of the rigid body by a wrench that what it touches takes part in, while pressures are

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <peat/solver/implicit_contact.h>
 #include <peat/solver/implicit_parameters.h>
 #include <peat/solver/scene.h>
 #include <peat/solver/up_form.h>
@@ -14,16 +15,21 @@ namespace peat {
 ///
 /// On faces of the mesh nothing passes unless a condition says so. On a saturated body's own surface, where
 /// no other saturated body lies behind it, the pressure is zero unless a condition says otherwise: prescribed
-/// at nodes where the surface runs along a face of cells, and by a penalty where it cuts cells.
+/// at nodes where the surface runs along a face of cells, and by a penalty where it cuts cells. Where a rigid
+/// body lies on it, the contact says what the fluid meets.
 template <int dim>
 class UpBoundary
 {
 public:
-  UpBoundary(const Space<dim> &space, const Scene<dim> &scene, double penalty);
+  UpBoundary(const Space<dim> &space, const Scene<dim> &scene, const ImplicitContact<dim> &contact,
+             double penalty);
 
   /// Find prescribed unknowns and the carriers of surface pieces; the surfaces are settled and located.
   /// `unused_unknowns` are those of this rank that nothing holds. Collective.
   void locate(const ActiveNodes<dim> &active, const std::vector<typename Space<dim>::Index> &unused_unknowns);
+
+  /// Whether rigid bodies cover other pieces of surface than they did then. Collective.
+  bool cover_changes() const;
 
   const dealii::AffineConstraints<double> &constraints() const { return homogeneous; }
   /// Only the unknowns that nothing holds.
@@ -77,6 +83,7 @@ private:
     std::vector<Index> displacement; ///< of component 0
     std::vector<double> N;
     bool weak_pressure = false;
+    const ContactParameters<dim> *cover = nullptr; ///< of a rigid body on it
     const Condition<dim> *pressure = nullptr;
     double otherwise = 0.; ///< as in GivenPressure
     CellId cell;
@@ -103,6 +110,7 @@ private:
   const Space<dim> &space;
   const Grid<dim> &grid;
   const Scene<dim> &scene;
+  const ImplicitContact<dim> &contact;
   const double penalty;
   dealii::AffineConstraints<double> homogeneous, unused_only;
   std::vector<Motion> motions;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <peat/solver/implicit_contact.h>
 #include <peat/solver/implicit_parameters.h>
 #include <peat/solver/linear_solver.h>
 #include <peat/solver/scene.h>
@@ -43,7 +44,8 @@ public:
 
   /// What is wanted next of a run of steps.
   enum class Mode { dynamic, quasi_static };
-  /// Begin a stage: rates at rest, or, for dynamics, from the points' velocities and the equations.
+  /// Begin a stage: rates at rest, or, for dynamics, from the points' velocities and the equations. From now
+  /// on rigid bodies act on material points.
   void start(Mode mode);
   /// Step that the solver would take next, and why.
   StableStep suggested_step() const;
@@ -116,6 +118,7 @@ private:
   double residual_norm(unsigned int block, double tolerance) const;
   bool converged(double tolerance) const;
   void line_search(const TimeLevel &level, double before);
+  [[noreturn]] void give_up(unsigned int iterations, double start, double end, double tolerance) const;
   /// What is prescribed, or held by nothing, stands for itself.
   void fill_empty_diagonal(const TimeLevel &level);
   void describe_unknowns();
@@ -144,6 +147,7 @@ private:
   ActiveNodes<dim> active;
   std::unique_ptr<UpForm<dim>> form;
   SmallNodes<dim> small_nodes;
+  ImplicitContact<dim> contact;
   UpBoundary<dim> boundary;
   LinearSolver linear_solver;
   BlockMatrix matrix;
@@ -168,6 +172,7 @@ private:
   Mode mode = Mode::dynamic;
   unsigned int damped_steps_left = 0;
   double next_step = 0.; ///< Runge-Kutta [s]; 0: none yet
+  std::string failure;   ///< of the iterations that were last given up
   bool first_step_done = false;
   std::array<double, 2> change_scale{};   ///< largest changes so far [m], [Pa]
   std::array<double, 2> residual_scale{}; ///< largest residuals so far: momentum [N], fluid [m^dim/s]
