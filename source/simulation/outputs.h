@@ -31,11 +31,8 @@ struct Simulation<dim>::Outputs
             const double start, const double end, const bool long_steps)
   {
     every_step = long_steps && output.statistics_interval == 0. && output.probe_interval == 0.;
-    const double statistics_interval =
-        output.statistics_interval > 0. ? output.statistics_interval : (end - start) / 200.;
-    statistics_times = Schedule::every(statistics_interval, start, end);
-    probe_times =
-        Schedule::every(output.probe_interval > 0. ? output.probe_interval : statistics_interval, start, end);
+    statistics_times = Schedule::every(output.statistics_interval_in(end - start), start, end);
+    probe_times = Schedule::every(output.probe_interval_in(end - start), start, end);
     if (every_step)
       statistics_times = probe_times = Schedule::at({}, start, end);
     picture_times = Schedule::every(output.interval, start, end);

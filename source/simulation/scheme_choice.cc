@@ -14,7 +14,7 @@
 namespace peat {
 namespace {
 // Measured (benchmarks.md): what a step costs in explicit ones.
-constexpr double semi_implicit_cost = 2.5;
+constexpr double semi_implicit_cost = 2.;
 constexpr double implicit_cost_2d = 250., implicit_cost_3d = 1000.;
 // Steps for the period of a wave, for the rise of a load, and for what then fades away.
 constexpr double steps_per_period = 100., steps_per_change = 25., steps_of_decay = 30.;
@@ -134,6 +134,15 @@ double passage_of_cell(const Scene<dim> &scene, const Grid<dim> &grid)
     if (body->material().mixture())
       fastest = std::max(fastest, wave_speed(*body));
   return grid.smallest_cell_size() / fastest;
+}
+
+/// Steps end at the times of statistics and probes.
+double count_steps(const double duration, const double dt, const OutputParameters &output)
+{
+  const double shortest =
+      std::min({duration, output.statistics_interval_in(duration), output.probe_interval_in(duration)});
+  constexpr double round_off = 1e-9;
+  return std::ceil(duration / shortest * (1. - round_off)) * std::ceil(shortest / dt * (1. - round_off));
 }
 
 template <int dim>
@@ -273,7 +282,7 @@ std::vector<SchemeEstimate> estimate_schemes(const Case<dim> &parameters, const 
       if (scheme.fixed_step > stable.dt)
         estimate.why_not =
             "'Explicit MPM/Time step' is above its stable step of " + to_text(stable.dt) + " s";
-      estimate.n_steps = std::ceil(stage.duration / estimate.dt);
+      estimate.n_steps = count_steps(stage.duration, estimate.dt, parameters.output);
       estimate.cost = estimate.n_steps * (semi ? semi_implicit_cost : 1.);
     }
     if (!estimate.why_not.empty())

@@ -18,7 +18,6 @@ constexpr double seconds_a_step = 2e-5;
 constexpr double seconds_a_point_and_step = 3e-7;
 constexpr double seconds_an_unknown_and_solve = 1e-5;
 constexpr double quasi_static_steps = 100.;
-constexpr double lines_a_stage = 200.;
 
 bool begins_with(const std::string &text, const std::string &begin)
 {
@@ -51,9 +50,7 @@ double dynamic_seconds(const Case<dim> &parameters, const StageParameters &stage
   if (stage.scheme != Scheme::automatic)
     used = std::find_if(estimates.begin(), estimates.end(),
                         [&](const SchemeEstimate &estimate) { return estimate.scheme == stage.scheme; });
-  const double interval = parameters.output.statistics_interval;
-  const double n_lines = interval > 0. ? stage.duration / interval : lines_a_stage;
-  return std::max(used->cost, n_lines) *
+  return used->cost *
          (seconds_a_step + seconds_a_point_and_step * scene.n_global_points());
 }
 

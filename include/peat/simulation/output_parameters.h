@@ -29,5 +29,15 @@ struct OutputParameters
   bool pictures = true;            ///< whether solution.pvd is written at all
   double statistics_interval = 0.; ///< of statistics.csv [s]; 0: 200 lines a stage
   double probe_interval = 0.;      ///< of probes.csv [s]; 0: as statistics
+
+  /// In a stage of this length, after what is 0 has been replaced [s].
+  double statistics_interval_in(const double duration) const
+  {
+    return statistics_interval > 0. ? statistics_interval : duration / 200.;
+  }
+  double probe_interval_in(const double duration) const
+  {
+    return probe_interval > 0. ? probe_interval : statistics_interval_in(duration);
+  }
 };
 } // namespace peat
