@@ -106,6 +106,7 @@ struct Pressed
   }
 
   static constexpr double dt = 1e-3;
+  Directory directory;
   std::unique_ptr<ParameterFile> file;
   std::unique_ptr<Case<dim>> parameters;
   std::unique_ptr<Grid<dim>> grid;
