@@ -174,8 +174,8 @@ void BodyContact<dim>::take_all_nodes()
 {
   for (ContactSite<dim> &site : sites) {
     site.acts = has_mass(site);
-    site.first_surface = {{site.first, no_index, no_index}, {1., 0., 0.}};
-    site.second_surface = {{site.second, no_index, no_index}, {1., 0., 0.}};
+    site.first_surface = {{site.first, no_index, no_index}, {1., 0., 0.}, {}};
+    site.second_surface = {{site.second, no_index, no_index}, {1., 0., 0.}, {}};
   }
   if (this->parameters.interface == ContactParameters<dim>::Interface::open ||
       !(first.is_saturated() || second.is_saturated()))
@@ -191,6 +191,8 @@ void BodyContact<dim>::take_all_nodes()
     site.normal = size > 0. ? (g[0] - g[1]) / size : Vector();
     const double own = g[0] * site.normal, others = -(g[1] * site.normal);
     site.area = site.acts && std::min(own, others) > 0.5 * std::max(own, others) ? std::min(own, others) : 0.;
+    site.first_surface.area[0] = own;
+    site.second_surface.area[0] = others;
   }
 }
 
@@ -206,21 +208,21 @@ void BodyContact<dim>::find_surfaces()
     for (unsigned int side = 0; side < 2; ++side)
       for (unsigned int d = 0; d < dim; ++d)
         g[side] += volume_gradient[side][s * dim + d] * sites[s].normal[d];
-    areas[0][s] = std::max(0., g[0]);
-    areas[1][s] = std::max(0., -g[1]);
-    both_areas[s] = has_mass(sites[s]) ? areas[0][s] + areas[1][s] : 0.;
+    areas[0][s] = g[0];
+    areas[1][s] = -g[1];
+    both_areas[s] = has_mass(sites[s]) ? std::max(0., areas[0][s]) + std::max(0., areas[1][s]) : 0.;
   }
   this->find_lines(first.nodes(), &ContactSite<dim>::first, site_of_node, both_areas);
   for (ContactSite<dim> &site : sites)
     if (site.acts) {
       // The same weights in both bodies, so that equal and opposite impulses act at one place.
-      this->weigh(site, &ContactSite<dim>::first, both_areas, site.first_surface);
-      this->weigh(site, &ContactSite<dim>::second, both_areas, site.second_surface);
+      this->weigh(site, &ContactSite<dim>::first, both_areas, areas[0], site.first_surface);
+      this->weigh(site, &ContactSite<dim>::second, both_areas, areas[1], site.second_surface);
       double sum[2] = {0., 0.};
       for (const std::uint32_t other : site.line)
         if (other != no_index)
           for (unsigned int side = 0; side < 2; ++side)
-            sum[side] += areas[side][other];
+            sum[side] += std::max(0., areas[side][other]);
       site.area = std::min(sum[0], sum[1]);
       site.acts = site.area > 0.;
     }
@@ -395,8 +397,8 @@ void BodyContact<dim>::constrain_flux()
 {
   for (const ContactSite<dim> &site : sites)
     if (site.counts && this->is_covered(site)) {
-      this->note_flux(first, site.first_surface, site.normal, site.area, noted[0]);
-      this->note_flux(second, site.second_surface, -site.normal, site.area, noted[1]);
+      this->note_flux(first, site.first_surface, site.normal, noted[0]);
+      this->note_flux(second, site.second_surface, -site.normal, noted[1]);
     }
   this->change_flux(first, noted[0]);
   this->change_flux(second, noted[1]);

@@ -189,13 +189,13 @@ void RigidContact<dim>::find_surfaces()
     Vector gradient;
     for (unsigned int d = 0; d < dim; ++d)
       gradient[d] = values_of(sites[s])[1 + 2 * dim + d];
-    areas[s] = std::max(0., -(gradient * sites[s].normal));
+    areas[s] = -(gradient * sites[s].normal);
   }
   this->find_lines(nodes, &ContactSite<dim>::second, site_of_node, areas);
   for (ContactSite<dim> &site : sites) {
     if (!site.acts)
       continue;
-    site.area = this->weigh(site, &ContactSite<dim>::second, areas, site.second_surface);
+    site.area = this->weigh(site, &ContactSite<dim>::second, areas, areas, site.second_surface);
     dealii::Point<dim> crossing;
     for (unsigned int k = 0; k < 3; ++k)
       if (site.second_surface.weight[k] > 0.)
@@ -522,7 +522,7 @@ void RigidContact<dim>::constrain_flux()
 {
   for (const ContactSite<dim> &site : sites)
     if (site.counts && this->is_covered(site))
-      this->note_flux(continuum, site.second_surface, -site.normal, site.area, noted);
+      this->note_flux(continuum, site.second_surface, -site.normal, noted);
   this->change_flux(continuum, noted);
 }
 

@@ -13,6 +13,9 @@ struct SurfaceNodes
 {
   std::array<std::uint32_t, 3> node = {no_index, no_index, no_index};
   std::array<double, 3> weight = {0., 0., 0.};
+  /// Of the body's surface that each node carries, along the normal out of the body: what fluid leaves the
+  /// body by it [m^(dim-1)].
+  std::array<double, 3> area = {0., 0., 0.};
 };
 
 /// What surfaces do at a site: they are free, keep their distance, or move as one.
@@ -126,14 +129,18 @@ protected:
   void find_lines(const ActiveNodes<dim> &nodes, std::uint32_t ContactSite<dim>::*node,
                   const std::vector<std::uint32_t> &site_of_node, const std::vector<double> &areas);
   /// Weights by the areas that a continuum's nodes carry. Returns their sum.
+  /// @param own_areas those of its own surface, by site [m^(dim-1)]
   double weigh(const ContactSite<dim> &site, std::uint32_t ContactSite<dim>::*node,
-               const std::vector<double> &areas, SurfaceNodes &surface) const;
+               const std::vector<double> &areas, const std::vector<double> &own_areas,
+               SurfaceNodes &surface) const;
 
   /// 1 / mass of a node, zero in components that a condition prescribes.
   static Vector node_compliance(const Continuum<dim> &continuum, std::uint32_t node);
   /// Change of the surface's velocity by a unit impulse there.
   static Vector compliance(const Continuum<dim> &continuum, const SurfaceNodes &surface);
   static Vector velocity(const std::vector<double> &field, const SurfaceNodes &surface);
+  /// Volume of fluid that leaves the body through the surface with normal n out of it [m^dim/s].
+  static double outflow(const std::vector<double> &flux, const SurfaceNodes &surface, const Vector &n);
   /// Note an impulse of this step on a surface; give_impulses() hands what was noted to the nodes.
   void push(NodalAdditions<dim> &noted, const SurfaceNodes &surface, const Vector &impulse) const;
   void give_impulses(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
@@ -147,7 +154,7 @@ protected:
     return parameters.law->ties() ? site.area > 0. : site.impulse * site.normal > 0.;
   }
   /// Note what the interface makes of the flux where bodies touch; n points out of the continuum.
-  void note_flux(const Continuum<dim> &continuum, const SurfaceNodes &surface, const Vector &n, double area,
+  void note_flux(const Continuum<dim> &continuum, const SurfaceNodes &surface, const Vector &n,
                  NodalAdditions<dim> &noted) const;
   void change_carrying_velocity(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
   /// What is to be kept of a response for the rest of the step: its mode, for pressures without that of
