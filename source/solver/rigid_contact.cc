@@ -12,11 +12,6 @@ constexpr double margin = 2.;
 constexpr double renewal = 0.5;
 /// A line of the mesh meets the rigid body if it does not pass it at more than this [cell sizes].
 constexpr double influence = 0.5 + 1e-9;
-/// Points that are less than this farther than the nearest one have a say in a node's normal [cell sizes].
-constexpr double normal_range = 0.25;
-/// By so much the gap of the nearest point may be less than the mean of those near it, and still count [cell
-/// sizes].
-constexpr double gap_slack = 0.02;
 
 template <std::size_t n>
 void add_over_ranks(std::array<double, n> &values, MPI_Comm communicator)
@@ -139,7 +134,7 @@ void RigidContact<dim>::find_gaps()
 
   // Normal, place, and volume gradient.
   sums.assign(size * n_columns, 0.);
-  const double range = normal_range * this->grid.smallest_cell_size();
+  const double range = this->surface_range * this->grid.smallest_cell_size();
   for (const auto &entry : near.entries()) {
     double *sum = values_of(sites[entry.site]);
     const auto &point = points[entry.point];
@@ -175,7 +170,7 @@ void RigidContact<dim>::find_gaps()
     // The least gap of all points that reach the node would be that of a surface which is in contact beside
     // it: a wheel would be held by the ground ahead of it. Within the slack it counts, as of flat surfaces.
     const double least = -nearest[index_of(site)], mean = sum[1 + 3 * dim] / sum[0];
-    site.gap = least + std::max(0., mean - least - gap_slack * this->grid.smallest_cell_size());
+    site.gap = least + std::max(0., mean - least - this->gap_slack * this->grid.smallest_cell_size());
   }
 }
 

@@ -103,6 +103,11 @@ public:
 protected:
   using Vector = dealii::Tensor<1, dim>;
   static constexpr double far = std::numeric_limits<double>::max();
+  /// Points that reach less far than the foremost one by this say with it where a surface is [cell sizes].
+  static constexpr double surface_range = 0.25;
+  /// By so much the gap of the nearest points may be less than the mean of those near them, and still count
+  /// [cell sizes].
+  static constexpr double gap_slack = 0.02;
 
   /// The impulse that the law allows.
   struct Response
