@@ -262,6 +262,8 @@ CASES = {
     "fem_D5": (d5, ("full",), 8),
     "fem_D5_compare": (lambda c: compared(c, "D5_standing_wave", {"Implicit solver/Start steps": 0},
                                           ("pressure", "displacement y", "velocity y")), ("full",), 8),
+    "fem_D3_compare": (lambda c: compared(c, "D3_ramp", {"Scheme": "semi-implicit"}, ("pressure", "displacement y"),
+                                          (40, 80)), ("full",), 20),   # with less the drained layer is a cell
     "fem_D6": (lambda c: d6(c, 8, FEM, 1e-2), ("full",), 270),
     "fem_D6_points": (lambda c: d6(c, 8, MPM, 5e-2), (), 300),
     "fem_D7": (d7, ("full",), 20),

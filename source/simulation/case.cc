@@ -291,6 +291,16 @@ std::string Case<dim>::entry_stage(const BodyParameters<dim> &body) const
 }
 
 template <int dim>
+std::vector<std::size_t> Case<dim>::entering_bodies(const StageParameters &stage) const
+{
+  std::vector<std::size_t> entering;
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    if (entry_stage(bodies[b]) == stage.name)
+      entering.push_back(b);
+  return entering;
+}
+
+template <int dim>
 void Case<dim>::set_fall_velocities()
 {
   const auto fall_velocity = [&](const double height, const double time, const Section &where) {

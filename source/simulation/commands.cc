@@ -116,14 +116,21 @@ int check(const ParameterFile &file, const RunOptions &options, MPI_Comm communi
     log.line(describe_elements(parameters, grid, scene));
     return exit_success;
   }
-  ExplicitMPM<dim> solver(parameters.scheme, grid, scene, 0.);
-  solver.prepare();
-  log.line(describe_points(parameters, grid, scene, solver.nodes().occupied_cells().size()));
+  {
+    ExplicitMPM<dim> solver(parameters.scheme, grid, scene, 0.);
+    solver.prepare();
+    log.line(describe_points(parameters, grid, scene, solver.nodes().occupied_cells().size()));
+  }
 
   // Stages count as if they began with the points at their places of the start.
   double start = 0., cost = 0.;
   bool measurable = true;
   for (const auto &stage : parameters.stages) {
+    for (const std::size_t b : parameters.entering_bodies(stage)) {
+      scene.bodies[b]->enter();
+      log.line("body '" + scene.bodies[b]->name() + "' comes in with stage '" + stage.name + "': " +
+               std::to_string(scene.bodies[b]->n_global_points()) + " points");
+    }
     log.line("stage '" + stage.name + "': " + describe_stage(stage));
     if (stage.solver == StageParameters::Solver::dynamic) {
       const Demand asked = demand(parameters, stage, scene, grid, start);
@@ -142,6 +149,8 @@ int check(const ParameterFile &file, const RunOptions &options, MPI_Comm communi
   }
   if (cost == 0. || !measurable)
     return exit_success;
+  ExplicitMPM<dim> solver(parameters.scheme, grid, scene, 0.);
+  solver.prepare();
   const StableStep stable = solver.stable_step();
   const double step = measure_step(solver, parameters.scheme.step_factor * stable.dt, cost, communicator);
   log.line("stable explicit step: " + to_text(stable.dt) + " s, limit: " + stable.limit + "; takes " +

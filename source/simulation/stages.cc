@@ -61,16 +61,15 @@ void Simulation<dim>::note_scheme(const Scheme scheme)
 template <int dim>
 void Simulation<dim>::bring_in_bodies(const StageParameters &stage)
 {
-  bool any = false;
+  const std::vector<std::size_t> entering = parameters.entering_bodies(stage);
+  if (entering.empty())
+    return;
   const Totals<dim> before = totals(scene, communicator);
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    if (parameters.entry_stage(parameters.bodies[b]) == stage.name) {
-      scene.bodies[b]->enter();
-      log.line("body '" + scene.bodies[b]->name() + "' comes in");
-      any = true;
-    }
-  if (any)
-    balances->admit(before, totals(scene, communicator));
+  for (const std::size_t b : entering) {
+    scene.bodies[b]->enter();
+    log.line("body '" + scene.bodies[b]->name() + "' comes in");
+  }
+  balances->admit(before, totals(scene, communicator));
 }
 
 template <int dim>

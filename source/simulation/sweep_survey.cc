@@ -75,6 +75,8 @@ double nominal_seconds(const Case<dim> &parameters, const Grid<dim> &grid, Scene
   }
   double start = 0.;
   for (const StageParameters &stage : parameters.stages) {
+    for (const std::size_t b : parameters.entering_bodies(stage))
+      scene.bodies[b]->enter();
     double n_solves = 1.;
     if (stage.solver == Solver::quasi_static)
       n_solves = quasi_static_steps;

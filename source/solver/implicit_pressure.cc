@@ -6,6 +6,7 @@
 #include <Teuchos_ParameterList.hpp>
 #include <ml_MultiLevelPreconditioner.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace peat {
@@ -14,6 +15,20 @@ namespace {
 constexpr unsigned int most_with_diagonal = 25;
 /// Mid-step velocity: new velocity minus this times dt a.
 constexpr double half = 0.5;
+
+/// Of the values around a node: their sum, and what alternates in each set of directions (bits of the index).
+/// Twice this is the same as n_corners times the values.
+template <int dim>
+inline void split_by_alternation(double *value)
+{
+  for (unsigned int bit = 1; bit < 1u << dim; bit *= 2)
+    for (unsigned int v = 0; v < 1u << dim; ++v)
+      if (!(v & bit)) {
+        const double sum = value[v] + value[v | bit], difference = value[v] - value[v | bit];
+        value[v] = sum;
+        value[v | bit] = difference;
+      }
+}
 } // namespace
 
 template <int dim>
@@ -71,6 +86,7 @@ void ImplicitPressure<dim>::renumber(const std::vector<CellId> &cells)
       spacing[i * dim + d] = (planes[above] - planes[below]) / (above - below);
     }
   }
+  find_alternating(around, before);
   neighbour.resize(n);
   for (std::size_t k = 0; k < n; ++k)
     for (unsigned int face = 0; face < 2 * dim; ++face) {
@@ -78,6 +94,31 @@ void ImplicitPressure<dim>::renumber(const std::vector<CellId> &cells)
       neighbour[k][face] = around[corner[k][v] * std::size_t(columns) + (v ^ bit)];
     }
   multigrid.reset();
+}
+
+template <int dim>
+void ImplicitPressure<dim>::find_alternating(const std::vector<double> &around, const double before)
+{
+  constexpr std::size_t columns = n_corners + 1;
+  const double end = before + cell_of_unknown.size();
+  inner.clear();
+  std::vector<char> is_inner(active.size(), 0);
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    if (!unbroken[i])
+      continue;
+    const double *unknown = &around[i * columns];
+    if (std::all_of(unknown, unknown + n_corners, [&](const double u) { return u >= before && u < end; })) {
+      is_inner[i] = 1;
+      inner.push_back({std::uint32_t(i), {}});
+      std::transform(unknown, unknown + n_corners, inner.back().unknowns.begin(),
+                     [&](const double u) { return std::uint32_t(u - before); });
+    }
+  }
+  outer.clear();
+  for (std::size_t k = 0; k < corner.size(); ++k)
+    for (unsigned int v = 0; v < n_corners; ++v)
+      if (const std::uint32_t i = corner[k][v]; unbroken[i] && !is_inner[i])
+        outer.push_back({i, std::uint32_t(k), v});
 }
 
 template <int dim>
@@ -126,7 +167,8 @@ void ImplicitPressure<dim>::find_mode_responses()
 {
   const std::size_t n = active.size();
   mode_response.assign(n * n_modes, 0.);
-  mode.resize(n * n_modes);
+  if (dealii::Utilities::MPI::n_mpi_processes(communicator) > 1)
+    mode.resize(n * n_modes);
   if (stabilisation == 0.)
     return;
   for (std::size_t i = 0; i < n; ++i) {
@@ -259,33 +301,35 @@ void ImplicitPressure<dim>::add_stabilisation(const Vector &pressures, const dou
 {
   if (stabilisation == 0.)
     return;
-  // One sign for each corner of a cell and each mode.
-  alignas(32) double sign[n_corners][n_modes];
-  for (unsigned int v = 0; v < n_corners; ++v)
+  const double *pressure = pressures.begin();
+  double *image = result.begin();
+  for (const auto &[i, unknowns] : inner) {
+    double value[n_corners];
+    for (unsigned int v = 0; v < n_corners; ++v)
+      value[v] = pressure[unknowns[v]];
+    split_by_alternation<dim>(value);
+    double scaled[n_corners] = {};
     for (unsigned int m = 0; m < n_modes; ++m)
-      sign[v][m] = __builtin_parity(v & mode_directions[m]) ? -1. : 1.;
+      scaled[mode_directions[m]] = factor * mode_response[i * n_modes + m] * value[mode_directions[m]];
+    split_by_alternation<dim>(scaled);
+    for (unsigned int v = 0; v < n_corners; ++v)
+      image[unknowns[v]] += scaled[v];
+  }
+  if (dealii::Utilities::MPI::n_mpi_processes(communicator) == 1)
+    return;
+  const auto sign = [](const OuterCorner &at, const unsigned int m) {
+    return __builtin_parity(at.corner & mode_directions[m]) ? -1. : 1.;
+  };
   std::fill(mode.begin(), mode.end(), 0.);
-  for (std::size_t k = 0; k < corner.size(); ++k) {
-    const double p = pressures.local_element(k);
-    for (unsigned int v = 0; v < n_corners; ++v) {
-      double *at_node = &mode[corner[k][v] * std::size_t(n_modes)];
-      for (unsigned int m = 0; m < n_modes; ++m)
-        at_node[m] += sign[v][m] * p;
-    }
-  }
-  active.sum_over_ranks(mode.data(), n_modes);
-  for (std::size_t row = 0; row < mode.size(); ++row)
-    mode[row] *= factor * mode_response[row];
-  for (std::size_t k = 0; k < corner.size(); ++k) {
-    double sum[n_modes] = {};
-    for (unsigned int v = 0; v < n_corners; ++v) {
-      const double *at_node = &mode[corner[k][v] * std::size_t(n_modes)];
-      for (unsigned int m = 0; m < n_modes; ++m)
-        sum[m] += sign[v][m] * at_node[m];
-    }
+  for (const OuterCorner &at : outer)
     for (unsigned int m = 0; m < n_modes; ++m)
-      result.local_element(k) += sum[m];
-  }
+      mode[at.node * std::size_t(n_modes) + m] += sign(at, m) * pressures.local_element(at.unknown);
+  active.sum_over_ranks(mode.data(), n_modes);
+  for (const OuterCorner &at : outer)
+    for (unsigned int m = 0; m < n_modes; ++m) {
+      const std::size_t row = at.node * std::size_t(n_modes) + m;
+      result.local_element(at.unknown) += sign(at, m) * factor * mode_response[row] * mode[row];
+    }
 }
 
 template <int dim>
@@ -360,7 +404,8 @@ void ImplicitPressure<dim>::make_multigrid()
   list.set("ML output", 0);
   list.set("aggregation: type", "Uncoupled");
   list.set("smoother: type", "Chebyshev");
-  list.set("smoother: sweeps", 2);
+  list.set("smoother: sweeps", 1);
+  list.set("smoother: Chebyshev alpha", 10.);
   list.set("coarse: type", "Amesos-KLU");
   list.set("coarse: max size", 1000);
   multigrid = std::make_unique<dealii::TrilinosWrappers::PreconditionAMG>();

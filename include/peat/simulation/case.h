@@ -89,6 +89,8 @@ struct Case
 
   /// Name of the stage with which a body comes in, "" for those that are there from the start.
   std::string entry_stage(const BodyParameters<dim> &body) const;
+  /// Numbers of the bodies that come in with this stage.
+  std::vector<std::size_t> entering_bodies(const StageParameters &stage) const;
 
 private:
   void check(const Section &root) const;

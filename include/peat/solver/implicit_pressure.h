@@ -9,6 +9,7 @@
 #include <deal.II/lac/trilinos_precondition.h>
 #include <deal.II/lac/trilinos_sparse_matrix.h>
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -84,6 +85,8 @@ private:
 
   friend class PressureSystem<dim>;
 
+  /// @param around unknowns around each node [n_nodes][n_corners + 1], -1: none @param before first of this rank
+  void find_alternating(const std::vector<double> &around, double before);
   void find_responses(const NodeFreedom<dim> &freedom, const NodalFields<dim> &nodal);
   void find_mode_responses();
   void find_right_side(const dealii::Tensor<1, dim> &gravity, const NodalFields<dim> &nodal);
@@ -117,6 +120,19 @@ private:
   /// Number, over all ranks, of the unknown on the other side of a face; -1: none.
   std::vector<std::array<double, 2 * dim>> neighbour;
   std::vector<char> unbroken;  ///< by node: every cell around it has one unknown
+  /// An unbroken node whose cells are all of this rank, and the unknowns around it.
+  struct InnerNode
+  {
+    std::uint32_t node;
+    std::array<std::uint32_t, n_corners> unknowns;
+  };
+  /// Where one of this rank's cells has an unbroken node that is not such.
+  struct OuterCorner
+  {
+    std::uint32_t node, unknown, corner;
+  };
+  std::vector<InnerNode> inner;
+  std::vector<OuterCorner> outer;
   std::vector<double> filling; ///< by node: part of its cells that have unknowns
   std::vector<double> spacing; ///< of the mesh at a node [n_nodes][dim]
 
