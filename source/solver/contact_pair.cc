@@ -259,7 +259,7 @@ void ContactPair<dim>::note_flux(const Continuum<dim> &continuum, const SurfaceN
     const double resistance =
         fields.sums[std::size_t(surface.node[k]) * fields.n_sums + Sums<dim>::resistance];
     return resistance > 0. && !continuum.closes_flux(std::size_t(surface.node[k]) * dim + d) ? 1. / resistance
-                                                                                          : 0.;
+                                                                                             : 0.;
   };
   // What acts on the interface from outside [Pa].
   double pressure = parameters.pressure;

@@ -80,10 +80,10 @@ private:
   std::vector<dealii::Point<dim>> places;
   std::array<NearPoints<dim>, 2> near;
   std::array<std::vector<double>, 2> volume_gradient; ///< dim columns a site [m^(dim-1)]
-  std::array<std::vector<double>, 2> edge;  ///< how far a body reaches from the site towards the other [m]
-  std::vector<char> is_near;                ///< by site: surfaces may touch soon
+  std::array<std::vector<double>, 2> edge; ///< how far a body reaches from the site towards the other [m]
+  std::vector<char> is_near;               ///< by site: surfaces may touch soon
   using Entries = std::vector<typename NearPoints<dim>::Entry>;
-  std::array<Entries, 2> near_entries;        ///< at such sites, of points that know where the surface is
+  std::array<Entries, 2> near_entries;       ///< at such sites, of points that know where the surface is
   std::vector<std::uint32_t> strip_of_entry; ///< the strip that its point is in, by near entry of one side
   std::vector<double> heights;               ///< of the surface over the site, by near entry of one side [m]
   /// Columns: weight; mean place of the surface, from the site; covariance, as a full matrix.
