@@ -294,7 +294,8 @@ void BodyContact<dim>::straighten_normals()
       for (unsigned int d = 0; d < dim; ++d)
         for (unsigned int e = 0; e < dim; ++e)
           covariance[d][e] += sums[side][0] * sums[side][1 + dim + d * dim + e];
-    const double ridge = 1e-10 * h * h * (sums[0][0] + sums[1][0]);
+    // Where a node sees a single column of points they show no slope, and round-off must not make one.
+    const double ridge = 1e-4 * h * h * (sums[0][0] + sums[1][0]);
     Vector &n = sites[s].normal;
     n -= slope(covariance, n, ridge);
     n /= n.norm();
