@@ -370,7 +370,8 @@ def outflow(run, since):
 
 def i1(c):
     h = 10. / 80
-    closed = {k: i1_case(c, "I1_bar_on_column", k, {}, h, h) for k in (1e-12, 1e-5, 1e-3)}
+    for k in (1e-12, 1e-5, 1e-3):
+        i1_case(c, "I1_bar_on_column", k, {}, h, h)
     # A drained interface: its layer sqrt(c_v t) is a cell thick in the end; the force must be far below the other.
     run = c.run("I1_bar_on_column", {"Constants/k": 1e-3, "Constants/cells": 160,
                                      "Contacts/impact/Interface": "drained"})
@@ -378,8 +379,15 @@ def i1(c):
     exact = i1_force(1e-3, drained=True)[0](0.005)
     found = s.mean(0.2 * half + 0.0045, 0.2 * half + 0.0055) / half
     c.below("drained, k = 0.001: force in the end", abs(found / exact - 1.), 0.1)
-    open_flow = outflow(run, 0.2 * half + 1e-4)
-    c.below("closed against open: fluid through the interface", outflow(closed[1e-3], 0.2 * h + 1e-4) / open_flow, 1e-6)
+    # In finite strain: the volumes of points in small strain are those of the start, while their places move. So their
+    # sums of V grad N do not vanish inside the column, and 2e-5 of what an open interface lets through is lost there.
+    flow = {}
+    for interface in ("impermeable", "drained"):
+        jaumann = variant(c, "I1_bar_on_column", "finite_strain", lambda text: text.replace(
+            "linear elastic", "jaumann", 1).replace("subsection linear elastic", "subsection jaumann", 1))
+        run = c.run(jaumann, {"Constants/k": 1e-3, "Contacts/impact/Interface": interface})
+        flow[interface] = outflow(run, 0.2 * h + 1e-4)
+    c.below("closed against open: fluid through the interface", flow["impermeable"] / flow["drained"], 1e-8)
 
 
 def i1_3d(c):
@@ -574,11 +582,11 @@ CASES = {
     "C5": (c5, (), 15),
     "C6": (lambda c: c6(c, 16), (), 100),
     "C7": (c7, (), 2),
-    "I1": (i1, (), 5),
+    "I1": (i1, ("full",), 8),
     "I1_3d": (i1_3d, ("full",), 2),
     "I2": (i2, (), 3),
     "I2_3d": (i2_3d, ("quick", "full"), 2),
-    "I3_discs": (i3_discs, (), 5),
+    "I3_discs": (i3_discs, ("full",), 5),
     "I3_block": (i3_block, (), 20),
     "I4": (tied_block, ("full",), 10),
     "contact_laws": (laws, ("quick", "full"), 2),

@@ -106,6 +106,18 @@ typename ContactPair<dim>::Vector ContactPair<dim>::velocity(const std::vector<d
 }
 
 template <int dim>
+double ContactPair<dim>::outflow(const std::vector<double> &flux, const SurfaceNodes &surface,
+                                 const Vector &n)
+{
+  double sum = 0.;
+  for (unsigned int k = 0; k < 3; ++k)
+    if (surface.area[k] != 0.)
+      for (unsigned int d = 0; d < dim; ++d)
+        sum += surface.area[k] * n[d] * flux[std::size_t(surface.node[k]) * dim + d];
+  return sum;
+}
+
+template <int dim>
 void ContactPair<dim>::push(NodalAdditions<dim> &noted, const SurfaceNodes &surface,
                             const Vector &impulse) const
 {
@@ -157,27 +169,34 @@ std::pair<double, double> ContactPair<dim>::fluid_force(const Continuum<dim> &co
 
 template <int dim>
 void ContactPair<dim>::note_flux(const Continuum<dim> &continuum, const SurfaceNodes &surface,
-                                 const Vector &n, const double area, NodalAdditions<dim> &noted) const
+                                 const Vector &n, NodalAdditions<dim> &noted) const
 {
   if (!continuum.is_saturated())
     return;
   const NodalFields<dim> &fields = continuum.fields();
-  const auto resistance = [&](const unsigned int k) {
-    return fields.sums[std::size_t(surface.node[k]) * fields.n_sums + Sums<dim>::resistance];
+  const auto conductance = [&](const unsigned int k, const unsigned int d) {
+    const double resistance =
+        fields.sums[std::size_t(surface.node[k]) * fields.n_sums + Sums<dim>::resistance];
+    return resistance > 0. && !continuum.closes_flux(std::size_t(surface.node[k]) * dim + d) ? 1. / resistance
+                                                                                             : 0.;
   };
-  double conductance = 0.;
+  // What acts on the interface from outside [Pa].
+  double pressure = parameters.pressure;
+  if (parameters.interface == ContactParameters<dim>::Interface::impermeable) {
+    double by_unit = 0.;
+    for (unsigned int k = 0; k < 3; ++k)
+      if (surface.area[k] != 0.)
+        for (unsigned int d = 0; d < dim; ++d)
+          by_unit += surface.area[k] * surface.area[k] * n[d] * n[d] * conductance(k, d);
+    pressure = by_unit > 0. ? outflow(fields.flux, surface, n) / by_unit : 0.;
+  }
   for (unsigned int k = 0; k < 3; ++k)
-    if (surface.weight[k] > 0. && resistance(k) > 0.)
-      conductance += surface.weight[k] * surface.weight[k] / resistance(k);
-  if (conductance == 0.)
-    return;
-  // What acts on the interface from outside.
-  const double force = parameters.interface == ContactParameters<dim>::Interface::impermeable
-                           ? velocity(fields.flux, surface) * n / conductance
-                           : parameters.pressure * area;
-  for (unsigned int k = 0; k < 3; ++k)
-    if (surface.weight[k] > 0. && resistance(k) > 0.)
-      noted.note(surface.node[k], -force * surface.weight[k] / resistance(k) * n);
+    if (surface.area[k] != 0.) {
+      Vector change;
+      for (unsigned int d = 0; d < dim; ++d)
+        change[d] = -pressure * surface.area[k] * conductance(k, d) * n[d];
+      noted.note(surface.node[k], change);
+    }
 }
 
 template <int dim>
@@ -278,17 +297,17 @@ void ContactPair<dim>::note_flux_reaction(const Continuum<dim> &continuum, const
   };
   double sum = 0.;
   for (unsigned int k = 0; k < 3; ++k)
-    if (surface.weight[k] > 0.)
+    if (surface.area[k] != 0.)
       for (unsigned int d = 0; d < dim; ++d)
-        sum += surface.weight[k] * surface.weight[k] * n[d] * n[d] * conductance(k, d);
+        sum += surface.area[k] * surface.area[k] * n[d] * n[d] * conductance(k, d);
   if (sum == 0.)
     return;
-  const double force = velocity(response.flux, surface) * n / sum;
+  const double pressure = outflow(response.flux, surface, n) / sum;
   for (unsigned int k = 0; k < 3; ++k)
-    if (surface.weight[k] > 0.) {
+    if (surface.area[k] != 0.) {
       Vector change;
       for (unsigned int d = 0; d < dim; ++d)
-        change[d] = -force * surface.weight[k] * conductance(k, d) * n[d];
+        change[d] = -pressure * surface.area[k] * conductance(k, d) * n[d];
       noted.note(surface.node[k], change);
     }
 }

@@ -123,6 +123,17 @@ void Continuum<dim>::find_prescribed_rows()
   prescribed.resize(velocity.size());
   for (std::size_t row = 0; row < velocity.size(); ++row)
     prescribed[row] = velocity[row] != untouched;
+  flux_is_given.assign(saturated ? prescribed.size() : 0, 0);
+  if (!saturated)
+    return;
+  for (const std::size_t row : closed_rows)
+    flux_is_given[row] = 1;
+  NodalFields<dim> fields;
+  fields.flux.assign(prescribed.size(), untouched);
+  for (const auto &condition : conditions)
+    condition->constrain_flux(active, {}, fields);
+  for (std::size_t row = 0; row < prescribed.size(); ++row)
+    flux_is_given[row] = flux_is_given[row] || fields.flux[row] != untouched;
 }
 
 template <int dim>

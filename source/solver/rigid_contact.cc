@@ -381,7 +381,7 @@ void RigidContact<dim>::constrain_flux()
 {
   for (const ContactSite<dim> &site : sites)
     if (site.counts && this->is_covered(site))
-      this->note_flux(continuum, site.second_surface, -site.normal, site.area, noted);
+      this->note_flux(continuum, site.second_surface, -site.normal, noted);
   this->change_flux(continuum, noted);
 }
 

@@ -10,11 +10,6 @@ constexpr double margin = 2.;
 constexpr double renewal = 0.5;
 /// A line of the mesh meets the rigid body if it does not pass it at more than this [cell sizes].
 constexpr double influence = 0.5 + 1e-9;
-/// Points that are less than this farther than the nearest one have a say in a node's normal [cell sizes].
-constexpr double normal_range = 0.25;
-/// By so much the gap of the nearest point may be less than the mean of those near it, and still count [cell
-/// sizes].
-constexpr double gap_slack = 0.02;
 } // namespace
 
 template <int dim>
@@ -107,7 +102,7 @@ void RigidSites<dim>::find_gaps(const ActiveNodes<dim> &nodes,
 
   // Normal, place, and volume gradient.
   sums.assign(size * n_columns, 0.);
-  const double range = normal_range * grid.smallest_cell_size();
+  const double range = ContactSite<dim>::surface_range * grid.smallest_cell_size();
   for (const auto &entry : near.entries()) {
     double *sum = values_of(sites[entry.site]);
     const auto &point = points[entry.point];
@@ -143,7 +138,8 @@ void RigidSites<dim>::find_gaps(const ActiveNodes<dim> &nodes,
     // The least gap of all points that reach the node would be that of a surface which is in contact beside
     // it: a wheel would be held by the ground ahead of it. Within the slack it counts, as of flat surfaces.
     const double least = -nearest[index_of(site)], mean = sum[1 + 3 * dim] / sum[0];
-    site.gap = least + std::max(0., mean - least - gap_slack * grid.smallest_cell_size());
+    site.gap =
+        least + std::max(0., mean - least - ContactSite<dim>::gap_slack * grid.smallest_cell_size());
   }
 }
 
@@ -156,13 +152,14 @@ void RigidSites<dim>::find_surfaces(const ActiveNodes<dim> &nodes)
     Vector gradient;
     for (unsigned int d = 0; d < dim; ++d)
       gradient[d] = values_of(sites[s])[1 + 2 * dim + d];
-    areas[s] = std::max(0., -(gradient * sites[s].normal));
+    areas[s] = -(gradient * sites[s].normal);
   }
   lines.find(nodes, &ContactSite<dim>::second, site_of_node, areas, sites);
   for (ContactSite<dim> &site : sites) {
     if (!site.acts)
       continue;
-    site.area = SiteLines<dim>::weigh(sites, site, &ContactSite<dim>::second, areas, site.second_surface);
+    site.area =
+        SiteLines<dim>::weigh(sites, site, &ContactSite<dim>::second, areas, areas, site.second_surface);
     dealii::Point<dim> crossing;
     for (unsigned int k = 0; k < 3; ++k)
       if (site.second_surface.weight[k] > 0.)

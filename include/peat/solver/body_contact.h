@@ -38,6 +38,18 @@ private:
   Vector outward(unsigned int side, std::size_t s) const;
   void find_normals();
   void find_gaps();
+  /// How far each body reaches from the sites towards the other along their normals, by `list` of the points
+  /// that reach them.
+  template <typename List>
+  void find_edges(const std::array<const List *, 2> &lists);
+  /// Sites where surfaces are near each other, and the points that reach them. False if there are none, on
+  /// any rank.
+  bool find_near_sites();
+  /// At these sites, moments of the places where the bodies' surfaces are.
+  void find_moments();
+  void straighten_normals();
+  /// Between the mean surfaces, where both bodies are [m].
+  double mean_gap(std::size_t s, double h) const;
   void find_surfaces();
   /// Of both surfaces.
   Vector compliance_of(const ContactSite<dim> &site) const;
@@ -68,7 +80,21 @@ private:
   std::vector<dealii::Point<dim>> places;
   std::array<NearPoints<dim>, 2> near;
   std::array<std::vector<double>, 2> volume_gradient; ///< dim columns a site [m^(dim-1)]
-  std::array<std::vector<double>, 2> edge;  ///< how far a body reaches from the site towards the other [m]
+  std::array<std::vector<double>, 2> edge; ///< how far a body reaches from the site towards the other [m]
+  std::vector<char> is_near;               ///< by site: surfaces may touch soon
+  using Entries = std::vector<typename NearPoints<dim>::Entry>;
+  std::array<Entries, 2> near_entries;       ///< at such sites, of points that know where the surface is
+  std::vector<std::uint32_t> strip_of_entry; ///< the strip that its point is in, by near entry of one side
+  std::vector<double> heights;               ///< of the surface over the site, by near entry of one side [m]
+  /// Columns: weight; mean place of the surface, from the site; covariance, as a full matrix.
+  static constexpr unsigned int n_moments = 1 + dim + dim * dim;
+  std::array<std::vector<double>, 2> moments;
+  /// How far one body reaches from the site towards the other within strips of half a cell beside it, in 3-D
+  /// columns [m]; n_strips columns.
+  static constexpr int strips_per_axis = 6;
+  static constexpr unsigned int n_strips = dim == 2 ? strips_per_axis : strips_per_axis * strips_per_axis;
+  std::vector<double> foremost;
+  static unsigned int strip(const ContactSite<dim> &site, const dealii::Point<dim> &x, double width);
   std::array<std::vector<double>, 2> areas; ///< of the interface, by site
   std::vector<double> both_areas;
   SiteLines<dim> lines;

@@ -82,6 +82,8 @@ protected:
   /// Change of the surface's velocity by a unit impulse there.
   static Vector compliance(const Continuum<dim> &continuum, const SurfaceNodes &surface);
   static Vector velocity(const std::vector<double> &field, const SurfaceNodes &surface);
+  /// Volume of fluid that leaves the body through the surface with normal n out of it [m^dim/s].
+  static double outflow(const std::vector<double> &flux, const SurfaceNodes &surface, const Vector &n);
   /// Note an impulse of this step on a surface; give_impulses() hands what was noted to the nodes.
   void push(NodalAdditions<dim> &noted, const SurfaceNodes &surface, const Vector &impulse) const;
   void give_impulses(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
@@ -95,7 +97,7 @@ protected:
     return parameters.law->ties() ? site.area > 0. : site.impulse * site.normal > 0.;
   }
   /// Note what the interface makes of the flux where bodies touch; n points out of the continuum.
-  void note_flux(const Continuum<dim> &continuum, const SurfaceNodes &surface, const Vector &n, double area,
+  void note_flux(const Continuum<dim> &continuum, const SurfaceNodes &surface, const Vector &n,
                  NodalAdditions<dim> &noted) const;
   void change_carrying_velocity(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
   /// What is to be kept of a response for the rest of the step: its mode, for pressures without that of

@@ -16,6 +16,9 @@ struct SurfaceNodes
 {
   std::array<std::uint32_t, 3> node = {no_index, no_index, no_index};
   std::array<double, 3> weight = {0., 0., 0.};
+  /// Of the body's surface that each node carries, along the normal out of the body: what fluid leaves the
+  /// body by it [m^(dim-1)].
+  std::array<double, 3> area = {0., 0., 0.};
 };
 
 /// What surfaces do at a site: they are free, keep their distance, or move as one.
@@ -26,6 +29,11 @@ template <int dim>
 struct ContactSite
 {
   static constexpr double far = std::numeric_limits<double>::max(); ///< gap where no point is near [m]
+  /// Points that reach less far than the foremost one by this say with it where a surface is [cell sizes].
+  static constexpr double surface_range = 0.25;
+  /// By so much the gap of the nearest points may be less than the mean of those near them, and still count
+  /// [cell sizes].
+  static constexpr double gap_slack = 0.02;
 
   std::uint32_t first = no_index;  ///< the nearest node, of the first continuum; no_index of a rigid body
   std::uint32_t second = no_index; ///< the same node, of the second continuum
@@ -68,8 +76,10 @@ public:
   void find(const ActiveNodes<dim> &nodes, std::uint32_t ContactSite<dim>::*node,
             const std::vector<std::uint32_t> &site_of_node, const std::vector<double> &areas, Sites &sites);
   /// Weights by the areas that nodes carry. Returns their sum.
+  /// @param own_areas those of the continuum's own surface, by site [m^(dim-1)]
   static double weigh(const Sites &sites, const ContactSite<dim> &site, std::uint32_t ContactSite<dim>::*node,
-                      const std::vector<double> &areas, SurfaceNodes &surface);
+                      const std::vector<double> &areas, const std::vector<double> &own_areas,
+                      SurfaceNodes &surface);
 
 private:
   std::vector<std::uint32_t> owner_of_site; ///< the site whose line it is on

@@ -66,9 +66,11 @@ public:
   std::vector<double> &carrying_velocity() { return remapped ? mapped_velocity : nodal.new_velocity; }
   bool remaps_velocity() const { return remapped; }
 
-  /// For contact: one entry per node and component, whether a condition prescribes it.
+  /// For contact: one entry per node and component, whether a condition prescribes the motion, and whether
+  /// the mesh's faces or conditions on them leave the flux no choice.
   void find_prescribed_rows();
   bool is_prescribed(const std::size_t row) const { return prescribed[row]; }
+  bool closes_flux(const std::size_t row) const { return flux_is_given[row]; }
 
 private:
   void resize_fields();
@@ -108,7 +110,7 @@ private:
   unsigned int steps_to_small_nodes = 0;
   /// Nodes and components on impermeable faces of the mesh.
   std::vector<std::size_t> closed_rows;
-  std::vector<char> prescribed;
+  std::vector<char> prescribed, flux_is_given;
   dealii::Tensor<1, dim> gravity_now;
   StepFindings step_findings;
 
