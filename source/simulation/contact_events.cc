@@ -1,9 +1,39 @@
 #include <peat/simulation/contact_events.h>
 
+#include <deal.II/base/mpi.h>
+
 #include <numeric>
 #include <sstream>
 
 namespace peat {
+namespace {
+/// 0 if it has no points yet; infinite if its motion is prescribed.
+template <int dim>
+double mass_of(const std::string &name, const Scene<dim> &scene, MPI_Comm communicator)
+{
+  for (const auto &rigid : scene.rigid_bodies)
+    if (rigid->name() == name)
+      return rigid->is_prescribed() ? std::numeric_limits<double>::infinity() : rigid->mass();
+  double mass = 0.;
+  for (const auto &body : scene.bodies)
+    if (body->name() == name) {
+      for (const std::uint32_t handle : body->handles())
+        mass += body->row(handle)[body->layout().mass];
+      mass = dealii::Utilities::MPI::sum(mass, communicator);
+    }
+  return mass;
+}
+
+template <int dim>
+double lighter_mass(const std::string &contact, const Scene<dim> &scene, MPI_Comm communicator)
+{
+  for (const auto &one : scene.contacts)
+    if (one.name == contact)
+      return std::min(mass_of(one.first, scene, communicator), mass_of(one.second, scene, communicator));
+  return 0.;
+}
+} // namespace
+
 template <int dim>
 void ContactEvents<dim>::note(const double time, const double dt, const Scene<dim> &scene)
 {
@@ -11,7 +41,11 @@ void ContactEvents<dim>::note(const double time, const double dt, const Scene<di
   constexpr unsigned int most_told = 6;
   for (const auto &[name, state] : scene.contact_states) {
     Record &record = records[name];
-    const bool touches = state.normal_force > 0.;
+    if (state.normal_force > 0. && record.mass == 0.)
+      record.mass = lighter_mass(name, scene, communicator);
+    // Nodes with hardly any mass meet before bodies do: what moves none of these is no touch.
+    constexpr double slightest_motion = 1e-9; // [m/s]
+    const bool touches = dt * state.normal_force > slightest_motion * record.mass;
     if (touches != record.touches) {
       record.touches = touches;
       ++record.n_events;

@@ -189,7 +189,7 @@ void Simulation<dim>::run_implicit_stage(const StageParameters &stage, const dou
   up_solver->start(stage.solver == StageParameters::Solver::quasi_static ? Mode::quasi_static
                                                                          : Mode::dynamic);
   begin_stage(stage, up_solver->suggested_step());
-  ContactEvents<dim> events(log);
+  ContactEvents<dim> events(log, communicator);
   double clock = seconds();
   while (now < end && !stopped) {
     const double event = std::min(end, outputs->next());
@@ -308,7 +308,7 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
     log.line(
         "note: 'Basis = q1' is not always stable where saturated bodies are in contact (doc/stability.md); "
         "prefer 'gimp'");
-  ContactEvents<dim> events(log);
+  ContactEvents<dim> events(log, communicator);
   const double energy_at_start = totals(scene, communicator).energy();
 
   // Between two events the step is constant, unless the stable step has changed by then.

@@ -13,9 +13,9 @@ template <int dim>
 class ContactEvents
 {
 public:
-  explicit ContactEvents(Log &log) : log(log) {}
+  ContactEvents(Log &log, MPI_Comm communicator) : log(log), communicator(communicator) {}
 
-  /// After a step of length dt that ended at this time.
+  /// After a step of length dt that ended at this time. Collective.
   void note(double time, double dt, const Scene<dim> &scene);
   /// At the end of a stage.
   void summarise(const Scene<dim> &scene);
@@ -27,6 +27,7 @@ private:
   struct Record
   {
     bool touches = false;
+    double mass = 0.; ///< of the lighter body [kg]; 0: not known yet
     unsigned int n_told = 0;
     unsigned long n_events = 0;
     unsigned long n_steps = 0;
@@ -39,6 +40,7 @@ private:
   };
 
   Log &log;
+  MPI_Comm communicator;
   std::map<std::string, Record> records;
 };
 } // namespace peat
