@@ -110,18 +110,28 @@ def read_columns(file_name):
     return rows[0], np.array([[number(v) for v in row] for row in rows[1:]])
 
 
+def finish(axes, times, label):
+    """Axes of a history; time is logarithmic where most of it belongs to a few long steps."""
+    if np.median(times) < 0.02 * times[-1]:
+        axes.set_xscale("log")
+        axes.set_xlim(left=times[times > 0.][0])
+    axes.set_xlabel("t [s]")
+    axes.set_ylabel(label)
+    axes.grid(alpha=0.3)
+    axes.legend()
+
+
 def draw_forces(axes, names, data):
-    """The normal force of each contact, its mean over a fiftieth of the run."""
+    """The normal force of each contact, and its mean over a fiftieth of the lines."""
     width = max(1, len(data) // 50)
     for column, name in enumerate(names):
         if name.endswith("/normal force [N]"):
             force = np.nan_to_num(data[:, column]) / 1e3
             force = np.pad(force, (width // 2, width - 1 - width // 2), mode="edge")
-            axes.plot(data[:, 0], np.convolve(force, np.ones(width) / width, mode="valid"), label=name.split("/")[0])
-    axes.set_xlabel("t [s]")
-    axes.set_ylabel("normal force [kN]")
-    axes.grid(alpha=0.3)
-    axes.legend()
+            mean = np.convolve(force, np.ones(width) / width, mode="valid")
+            line = axes.plot(data[:, 0], mean, label=name.split("/")[0])[0]
+            axes.plot(data[:, 0], np.nan_to_num(data[:, column]) / 1e3, color=line.get_color(), alpha=0.3, lw=0.7)
+    finish(axes, data[:, 0], "normal force [kN]")
 
 
 def draw_probes(axes, names, data, quantity, factor, unit):
@@ -129,10 +139,7 @@ def draw_probes(axes, names, data, quantity, factor, unit):
         probe, _, field = name.rpartition("/")
         if field.startswith(quantity):
             axes.plot(data[:, 0], factor * data[:, column], label=probe)
-    axes.set_xlabel("t [s]")
-    axes.set_ylabel("%s [%s]" % (quantity, unit))
-    axes.grid(alpha=0.3)
-    axes.legend()
+    finish(axes, data[:, 0], "%s [%s]" % (quantity, unit))
 
 
 def main():

@@ -65,7 +65,8 @@ def table(rows):
     values.sort(key=lambda v: finer * float(v))
     groups = {}
     for row in rows:
-        groups.setdefault(", ".join(row[name] for name in others if row[name]), {}).setdefault(row[first], row)
+        if row["state"] != "refused":   # what has no meaning together
+            groups.setdefault(", ".join(row[name] for name in others if row[name]), {}).setdefault(row[first], row)
     text = ["| | %s | order | 1 %% costs |" % " | ".join(values), "|---" * (len(values) + 3) + "|"]
     for name, runs in groups.items():
         cells, points = [], []
