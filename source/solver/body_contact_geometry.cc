@@ -331,10 +331,8 @@ void BodyContact<dim>::find_surfaces()
   for (ContactSite<dim> &site : sites)
     if (site.acts) {
       // The same weights in both bodies, so that equal and opposite impulses act at one place.
-      SiteLines<dim>::weigh(sites, site, &ContactSite<dim>::first, both_areas, areas[0],
-                            site.first_surface);
-      SiteLines<dim>::weigh(sites, site, &ContactSite<dim>::second, both_areas, areas[1],
-                            site.second_surface);
+      SiteLines<dim>::weigh(sites, site, &ContactSite<dim>::first, both_areas, site.first_surface);
+      SiteLines<dim>::weigh(sites, site, &ContactSite<dim>::second, both_areas, site.second_surface);
       double sum[2] = {0., 0.};
       for (const std::uint32_t other : site.line)
         if (other != no_index)

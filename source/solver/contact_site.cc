@@ -68,15 +68,14 @@ void SiteLines<dim>::find(const ActiveNodes<dim> &nodes, std::uint32_t ContactSi
 template <int dim>
 double SiteLines<dim>::weigh(const Sites &sites, const ContactSite<dim> &site,
                              std::uint32_t ContactSite<dim>::*node, const std::vector<double> &areas,
-                             const std::vector<double> &own_areas, SurfaceNodes &surface)
+                             SurfaceNodes &surface)
 {
   double sum = 0.;
   surface = {};
   for (unsigned int k = 0; k < 3; ++k)
     if (const std::uint32_t other = site.line[k]; other != no_index) {
       surface.node[k] = sites[other].*node;
-      surface.area[k] = own_areas[other];
-      surface.weight[k] = std::max(0., areas[other]);
+      surface.weight[k] = surface.area[k] = std::max(0., areas[other]);
       sum += surface.weight[k];
     }
   for (double &weight : surface.weight)

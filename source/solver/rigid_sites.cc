@@ -158,8 +158,7 @@ void RigidSites<dim>::find_surfaces(const ActiveNodes<dim> &nodes)
   for (ContactSite<dim> &site : sites) {
     if (!site.acts)
       continue;
-    site.area =
-        SiteLines<dim>::weigh(sites, site, &ContactSite<dim>::second, areas, areas, site.second_surface);
+    site.area = SiteLines<dim>::weigh(sites, site, &ContactSite<dim>::second, areas, site.second_surface);
     dealii::Point<dim> crossing;
     for (unsigned int k = 0; k < 3; ++k)
       if (site.second_surface.weight[k] > 0.)

@@ -16,8 +16,7 @@ struct SurfaceNodes
 {
   std::array<std::uint32_t, 3> node = {no_index, no_index, no_index};
   std::array<double, 3> weight = {0., 0., 0.};
-  /// Of the body's surface that each node carries, along the normal out of the body: what fluid leaves the
-  /// body by it [m^(dim-1)].
+  /// Of the interface that each node carries, by which fluid may leave the body [m^(dim-1)].
   std::array<double, 3> area = {0., 0., 0.};
 };
 
@@ -76,10 +75,8 @@ public:
   void find(const ActiveNodes<dim> &nodes, std::uint32_t ContactSite<dim>::*node,
             const std::vector<std::uint32_t> &site_of_node, const std::vector<double> &areas, Sites &sites);
   /// Weights by the areas that nodes carry. Returns their sum.
-  /// @param own_areas those of the continuum's own surface, by site [m^(dim-1)]
   static double weigh(const Sites &sites, const ContactSite<dim> &site, std::uint32_t ContactSite<dim>::*node,
-                      const std::vector<double> &areas, const std::vector<double> &own_areas,
-                      SurfaceNodes &surface);
+                      const std::vector<double> &areas, SurfaceNodes &surface);
 
 private:
   std::vector<std::uint32_t> owner_of_site; ///< the site whose line it is on
