@@ -128,8 +128,8 @@ int check(const ParameterFile &file, const RunOptions &options, MPI_Comm communi
   for (const auto &stage : parameters.stages) {
     for (const std::size_t b : parameters.entering_bodies(stage)) {
       scene.bodies[b]->enter();
-      log.line("body '" + scene.bodies[b]->name() + "' comes in with stage '" + stage.name + "': " +
-               std::to_string(scene.bodies[b]->n_global_points()) + " points");
+      log.line("body '" + scene.bodies[b]->name() + "' comes in with stage '" + stage.name +
+               "': " + std::to_string(scene.bodies[b]->n_global_points()) + " points");
     }
     log.line("stage '" + stage.name + "': " + describe_stage(stage));
     if (stage.solver == StageParameters::Solver::dynamic) {

@@ -235,8 +235,8 @@ Demand demand(const Case<dim> &parameters, const StageParameters &stage, const S
       if (samples_in_moment > 0)
         largest = std::max(largest, std::abs(values[std::min(i + samples_in_moment, n_samples)] - values[i]));
       else if (change > much * range)
-        largest = std::max(
-            largest, sudden_change(signal, start + i * interval, start + (i + 1) * interval, moment));
+        largest = std::max(largest,
+                           sudden_change(signal, start + i * interval, start + (i + 1) * interval, moment));
     }
     if (fast.empty() && largest > much * range)
       fast = "'" + signal.name + "' changes within the passage of a wave";

@@ -50,8 +50,7 @@ double dynamic_seconds(const Case<dim> &parameters, const StageParameters &stage
   if (stage.scheme != Scheme::automatic)
     used = std::find_if(estimates.begin(), estimates.end(),
                         [&](const SchemeEstimate &estimate) { return estimate.scheme == stage.scheme; });
-  return used->cost *
-         (seconds_a_step + seconds_a_point_and_step * scene.n_global_points());
+  return used->cost * (seconds_a_step + seconds_a_point_and_step * scene.n_global_points());
 }
 
 /// Rough seconds of a run; the scene is that of its start.

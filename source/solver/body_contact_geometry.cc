@@ -178,9 +178,10 @@ void BodyContact<dim>::find_moments()
                  [&](double *data) { continuum(side).nodes().max_over_ranks(data, n_strips); });
     for (std::size_t i = 0; i < entries.size(); ++i) {
       const auto &entry = entries[i];
-      const double w = entry.N *
-                       std::max(0., 1. - (edge[side][entry.site] - heights[i]) / (ContactSite<dim>::surface_range * h)) *
-                       std::max(0., 1. - (foremost[strip_of_entry[i]] - heights[i]) / (strip_range * h));
+      const double w =
+          entry.N *
+          std::max(0., 1. - (edge[side][entry.site] - heights[i]) / (ContactSite<dim>::surface_range * h)) *
+          std::max(0., 1. - (foremost[strip_of_entry[i]] - heights[i]) / (strip_range * h));
       if (w == 0.)
         continue;
       const Vector &n = sites[entry.site].normal;

@@ -138,8 +138,7 @@ void RigidSites<dim>::find_gaps(const ActiveNodes<dim> &nodes,
     // The least gap of all points that reach the node would be that of a surface which is in contact beside
     // it: a wheel would be held by the ground ahead of it. Within the slack it counts, as of flat surfaces.
     const double least = -nearest[index_of(site)], mean = sum[1 + 3 * dim] / sum[0];
-    site.gap =
-        least + std::max(0., mean - least - ContactSite<dim>::gap_slack * grid.smallest_cell_size());
+    site.gap = least + std::max(0., mean - least - ContactSite<dim>::gap_slack * grid.smallest_cell_size());
   }
 }
 

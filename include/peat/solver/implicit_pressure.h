@@ -85,7 +85,9 @@ private:
 
   friend class PressureSystem<dim>;
 
-  /// @param around unknowns around each node [n_nodes][n_corners + 1], -1: none @param before first of this rank
+  /// For the stabilisation: nodes whose cells are all of this rank, and corners at the others.
+  /// @param around unknowns around each node [n_nodes][n_corners + 1]; -1: none
+  /// @param before the first unknown of this rank
   void find_alternating(const std::vector<double> &around, double before);
   void find_responses(const NodeFreedom<dim> &freedom, const NodalFields<dim> &nodal);
   void find_mode_responses();
@@ -119,7 +121,7 @@ private:
   std::vector<std::array<std::uint32_t, n_corners>> corner;
   /// Number, over all ranks, of the unknown on the other side of a face; -1: none.
   std::vector<std::array<double, 2 * dim>> neighbour;
-  std::vector<char> unbroken;  ///< by node: every cell around it has one unknown
+  std::vector<char> unbroken; ///< by node: every cell around it has one unknown
   /// An unbroken node whose cells are all of this rank, and the unknowns around it.
   struct InnerNode
   {
