@@ -30,8 +30,8 @@ Teuchos::ParameterList multigrid_settings()
 }
 
 /// a A + b B for matrices of different patterns but the same maps.
-void sum(TrilinosMatrix &result, const TrilinosMatrix &A, const double a, const TrilinosMatrix &B,
-         const double b)
+void add_scaled(TrilinosMatrix &result, const TrilinosMatrix &A, const double a, const TrilinosMatrix &B,
+                const double b)
 {
   Epetra_CrsMatrix *total = nullptr;
   EpetraExt::MatrixMatrix::Add(A.trilinos_matrix(), false, a, B.trilinos_matrix(), false, b, total);
@@ -146,7 +146,7 @@ void SchurInverse::build(const BlockMatrix &matrix, const PreconditionerData &da
 {
   const TrilinosMatrix &D = matrix.block(1, 1);
   if (data.pressure_mass)
-    sum(stiff, *data.pressure_mass, 1., D, -1.);
+    add_scaled(stiff, *data.pressure_mass, 1., D, -1.);
   else {
     stiff.copy_from(D);
     stiff *= -1.;
@@ -157,7 +157,7 @@ void SchurInverse::build(const BlockMatrix &matrix, const PreconditionerData &da
   if (has_inertia) {
     TrilinosMatrix product;
     matrix.block(1, 0).mmult(product, matrix.block(0, 1), inverse(*data.inertia));
-    sum(inert, product, 1., D, -1.);
+    add_scaled(inert, product, 1., D, -1.);
     make_diagonal_positive(inert);
     inert_inverse.build(inert, 1);
   }

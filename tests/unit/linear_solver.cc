@@ -4,7 +4,7 @@
 #define BOOST_TEST_MODULE linear_solver
 #define BOOST_TEST_NO_MAIN
 #define BOOST_TEST_ALTERNATIVE_INIT_API
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include <peat/base/error.h>
 #include <peat/solver/linear_solver.h>
