@@ -122,8 +122,10 @@ std::vector<double> rigid_body_modes(const DisplacementUnknowns &unknowns)
   return modes;
 }
 
-void Multigrid::build(const TrilinosMatrix &matrix, const unsigned int n_components)
+void Multigrid::build(TrilinosMatrix &matrix, const unsigned int n_components)
 {
+  factor = 1. / absolute_diagonal(matrix).linfty_norm();
+  matrix *= factor;
   Teuchos::ParameterList list = multigrid_settings();
   list.set("PDE equations", int(n_components));
   amg.initialize(matrix, list);
@@ -140,6 +142,13 @@ void Multigrid::build(const TrilinosMatrix &matrix, const unsigned int dim, cons
   static double nothing = 0.;
   list.set("null space: vectors", modes.empty() ? &nothing : const_cast<double *>(modes.data()));
   amg.initialize(matrix, list);
+}
+
+void Multigrid::vmult(TrilinosVector &result, const TrilinosVector &source) const
+{
+  amg.vmult(result, source);
+  if (factor != 1.)
+    result *= factor;
 }
 
 void SchurInverse::build(const BlockMatrix &matrix, const PreconditionerData &data)

@@ -49,13 +49,17 @@ private:
 class Multigrid
 {
 public:
-  /// n_components unknowns stand together at each place; the near-null space is constant in each.
-  void build(const TrilinosMatrix &matrix, unsigned int n_components);
-  /// Displacements; modes [n_modes * n_owned] span the near-null space and must live as long as this.
+  /// n_components unknowns stand together at each place; the near-null space is constant in each. Scales the
+  /// matrix: ML adds 1e-12 to the diagonal of the coarsest level, whatever stands there. Compliances are of
+  /// that size, and long waves would be lost.
+  void build(TrilinosMatrix &matrix, unsigned int n_components);
+  /// Displacements, whose stiffnesses are large numbers; modes [n_modes * n_owned] span the near-null space
+  /// and must live as long as this.
   void build(const TrilinosMatrix &matrix, unsigned int dim, const std::vector<double> &modes);
-  void vmult(TrilinosVector &result, const TrilinosVector &source) const { amg.vmult(result, source); }
+  void vmult(TrilinosVector &result, const TrilinosVector &source) const;
 
 private:
+  double factor = 1.; ///< on the matrix
   dealii::TrilinosWrappers::PreconditionAMG amg;
 };
 
