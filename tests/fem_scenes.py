@@ -64,7 +64,7 @@ def p3(c):
 
 
 class Mandel:
-    """The series of Cheng and Detournay (1988) for the constants of P4_mandel.prm but nu and K_f; theory in reference/exact/mandel.py."""
+    """The series of Cheng and Detournay (1988), see reference/exact/mandel.py; constants as in P4_mandel.prm."""
 
     def __init__(self, nu=0.2, K_f=2.2e9, terms=300):
         E, n, F, a, k = 1e7, 0.4, 100., 1., 1e-5
@@ -129,7 +129,8 @@ def p4(c, cells=40):
     for name, method in DISCRETE:
         # Peaks are flat: steps of the usual tolerance say where they are to 5 %.
         settings = dict(method, **{"Constants/cells": cells, "Implicit solver/Step tolerance": 1e-4})
-        check_mandel(c, name, c.run("P4_mandel", settings), Mandel(), tight if method.get("Method") == "fem" else (2e-2,) * 4)
+        bounds = tight if method["Method"] == "fem" else (2e-2,) * 4
+        check_mandel(c, name, c.run("P4_mandel", settings), Mandel(), bounds)
     # The plate knows the force alone, so it is right for any ground; K_f = 1e7 Pa: gassy water, Q = 4.5 K_d.
     for nu, K_f in (0., 2.2e9), (0.4, 2.2e9), (0.2, 1e7):
         run = c.run("P4_mandel", dict(FEM, **{"Constants/cells": 20, "Constants/nu": nu, "Constants/K_f": K_f,
@@ -159,23 +160,27 @@ def tied(c):
         for name, kind in kinds.items():
             if scene == "P4_mandel_3d" and name == "explicit":
                 continue
-            settings = dict(few, **kind)
-            if scene == "P4_mandel_3d":
+            # The probe at the side stands within a cell, so that it is on one rank.
+            third = ", h/3" if scene == "P4_mandel_3d" else ""
+            settings = dict(few, **{"Probes/side/Point": "a - h/3, b/2 - h/3" + third}, **kind)
+            if third:
                 settings["Constants/cells"] = 6
             runs = [c.run(scene, settings, ranks=n) for n in c.rank_counts]
             for n, run in zip(c.rank_counts[1:], runs[1:]):
                 difference, column = compare_tables(runs[0].directory + "/probes.csv", run.directory + "/probes.csv")
-                # Implicit points at a drained side differ by 1e-5 on three ranks without a plate, too: in velocity alone.
-                c.below("%s, %s, %d ranks (%s)" % (scene, name, n, column), difference, 2e-5 if name == "points" else 1e-7)
-            zeros = ", 0" if scene == "P4_mandel_3d" else ""
-            uneven = c.run(scene, dict(settings, **{"Conditions/force/Value": "0, -2*F/a^2*x" + zeros}))
+                c.below("%s, %s, %d ranks (%s)" % (scene, name, n, column), difference, 1e-7)
+            uneven = c.run(scene, dict(settings, **{"Conditions/force/Value": "0, -2*F/a^2*x" + (", 0" if third else "")}))
             difference, column = compare_tables(runs[0].directory + "/probes.csv", uneven.directory + "/probes.csv")
-            c.below("%s, %s, uneven force (%s)" % (scene, name, column), difference, 1e-7)
-            if scene == "P4_mandel_3d" and name != "dynamic elements":
-                flat = c.run("P4_mandel", settings)
+            # In explicit steps the force stands where the surface is, which leaves the plate's nodes by 1e-4 of a cell.
+            c.below("%s, %s, uneven force (%s)" % (scene, name, column), difference,
+                    1e-4 if kind.get("Stages/consolidation/Scheme") else 1e-7)
+            if third and name != "dynamic elements":
+                flat = c.run("P4_mandel", dict(settings, **{"Probes/side/Point": "a - h/3, b/2 - h/3"}))
                 a, b = flat.table("probes.csv"), runs[0].table("probes.csv")
+                # The stabilisation of cell pressures acts at nodes inside the body, of which two cells along z have fewer.
                 c.below("%s against 2-D: pressure in the middle" % name,
-                        max(abs(v - w) for v, w in zip(a["middle/pressure"], b["middle/pressure"])) / 50., 1e-5)
+                        max(abs(v - w) for v, w in zip(a["middle/pressure"], b["middle/pressure"])) / 50.,
+                        1e-3 if name == "semi-implicit" else 1e-5)
 
 
 def p5(c, cells, method, pressure, displacement):
