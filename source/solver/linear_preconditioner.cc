@@ -2,6 +2,8 @@
 
 #include <peat/base/error.h>
 
+#include <deal.II/base/mpi.h>
+
 #include <EpetraExt_MatrixMatrix.h>
 #include <Epetra_Import.h>
 #include <Teuchos_ParameterList.hpp>
@@ -9,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace peat {
 using BlockMatrix = LinearSolver::BlockMatrix;
@@ -132,13 +135,17 @@ void Multigrid::build(TrilinosMatrix &matrix, const unsigned int n_components)
   amg.initialize(matrix, list);
 }
 
-std::vector<std::vector<double>> lattice_places(const DisplacementUnknowns &unknowns)
+std::vector<std::vector<double>> lattice_places(const DisplacementUnknowns &unknowns, MPI_Comm communicator)
 {
   std::vector<std::vector<double>> places(unknowns.dim);
   for (unsigned int d = 0; d < unknowns.dim; ++d) {
-    std::vector<double> planes;
+    std::set<double> mine;
     for (const auto &x : unknowns.positions)
-      planes.push_back(x[d]);
+      mine.insert(x[d]);
+    std::vector<double> planes;
+    for (const auto &of_rank :
+         dealii::Utilities::MPI::all_gather(communicator, std::vector<double>(mine.begin(), mine.end())))
+      planes.insert(planes.end(), of_rank.begin(), of_rank.end());
     std::sort(planes.begin(), planes.end());
     // Round-off apart.
     const double close = planes.empty() ? 0. : 1e-9 * (planes.back() - planes.front());
@@ -202,8 +209,13 @@ void Multigrid::build(const TrilinosMatrix &matrix, const std::vector<double> &m
   // these are too large: iterations then grow with the mesh. Here they are made of neighbours on the lattice
   // of nodes alone. ML keeps what is closer than a share of the closeness of all others: between diagonals
   // and every second node.
+  // What it drops it adds to the diagonal when it estimates the largest eigenvalue, which may then be far
+  // off, where there is much inertia above all. So the smoother must do without it: two sweeps forth and back
+  // cost as much as a Chebyshev polynomial of fourth degree.
   const double closeness = largest_closeness(matrix, places);
   if (closeness > 0.) {
+    list.set("smoother: type", "symmetric Gauss-Seidel");
+    list.set("smoother: sweeps", 2);
     list.set("aggregation: aux: enable", true);
     list.set("aggregation: aux: max levels", 1);
     list.set("aggregation: aux: threshold", 1. / (2. * std::sqrt(double(dim)) * closeness));
@@ -309,7 +321,7 @@ void VolumetricInverse::vmult(TrilinosVector &result, const TrilinosVector &sour
 }
 
 BlockPreconditioner::BlockPreconditioner(const DisplacementUnknowns &unknowns)
-    : modes(rigid_body_modes(unknowns)), places(lattice_places(unknowns))
+    : unknowns(unknowns), modes(rigid_body_modes(unknowns))
 {}
 
 void BlockPreconditioner::build(const BlockMatrix &new_matrix, const PreconditionerData &new_data)
@@ -317,6 +329,8 @@ void BlockPreconditioner::build(const BlockMatrix &new_matrix, const Preconditio
   matrix = &new_matrix;
   data = new_data;
   const TrilinosMatrix &stiffness = data.shear ? *data.shear : matrix->block(0, 0);
+  if (places.empty())
+    places = lattice_places(unknowns, matrix->get_mpi_communicator());
   displacement.build(stiffness, modes, places);
   if (data.shear)
     volumetric.build(data);

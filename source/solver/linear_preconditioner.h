@@ -136,6 +136,7 @@ private:
 class BlockPreconditioner : public LinearSolver::Preconditioner
 {
 public:
+  /// `unknowns` must live as long as this.
   explicit BlockPreconditioner(const DisplacementUnknowns &unknowns);
   void build(const LinearSolver::BlockMatrix &matrix, const PreconditionerData &data) override;
   void vmult(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const override;
@@ -148,7 +149,8 @@ private:
   /// in which u and p hardly meet: div u sees p - Pi p only.
   void solve_pressures(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const;
 
-  std::vector<double> modes;
+  const DisplacementUnknowns &unknowns;
+  const std::vector<double> modes;
   std::vector<std::vector<double>> places;
   const LinearSolver::BlockMatrix *matrix = nullptr;
   PreconditionerData data;
@@ -162,8 +164,9 @@ private:
 /// middle; 0 at fixed unknowns. [n_modes * n_owned]
 std::vector<double> rigid_body_modes(const DisplacementUnknowns &unknowns);
 
-/// Where this rank's nodes stand among its planes of nodes, by direction [dim][n_nodes].
-std::vector<std::vector<double>> lattice_places(const DisplacementUnknowns &unknowns);
+/// Where this rank's nodes stand among the planes of nodes of all ranks, by direction [dim][n_nodes].
+/// Collective.
+std::vector<std::vector<double>> lattice_places(const DisplacementUnknowns &unknowns, MPI_Comm communicator);
 
 /// Diagonal of C diag(A)^-1 C^T.
 TrilinosVector diagonal_of_product(const TrilinosMatrix &C, const TrilinosVector &diagonal_of_A);

@@ -128,7 +128,7 @@ BOOST_AUTO_TEST_CASE(three_dimensions)
   check<3>(setting, 50);
 }
 
-/// Four times the unknowns may cost no more than so many iterations more.
+/// More unknowns may cost no more than so many iterations more.
 BOOST_AUTO_TEST_CASE(iterations_on_finer_meshes)
 {
   const auto iterations = [](const PoroelasticCase &setting, const auto &dimension) {
@@ -152,15 +152,16 @@ BOOST_AUTO_TEST_CASE(iterations_on_finer_meshes)
   const std::integral_constant<int, 3> solid;
   setting.conductivity = 1e-12;
   setting.dt = 0.1;
-  check_growth(plane, 32, 64, 35, 3);
+  check_growth(plane, 32, 64, 30, 4);
   check_growth(solid, 6, 10, 28, 4);
+  // On coarse meshes inertia alone counts, and there is hardly anything to do.
   setting.dynamic = setting.seepage_inertia = true;
   setting.conductivity = 1e-2;
   setting.dt = 1e-4;
-  check_growth(plane, 32, 64, 25, 6);
+  check_growth(plane, 64, 96, 25, 4);
   setting.conductivity = 1e-7;
   setting.dt = 1e-3;
-  check_growth(plane, 32, 64, 27, 6);
+  check_growth(plane, 64, 96, 25, 4);
 }
 
 BOOST_AUTO_TEST_CASE(special_boundaries_and_cells)
