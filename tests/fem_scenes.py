@@ -151,6 +151,7 @@ def tied(c):
     """Of what acts on a plate the sum counts, whatever the ranks, in two and three dimensions."""
     dynamic = {"Stages/consolidation/Solver": "dynamic", "Constants/cells": 10, "Constants/End": "2e-3*t_1"}
     kinds = {"finite elements": FEM, "points": {"Method": "mpm"},
+             "multigrid": dict(FEM, **{"Linear solver/Method": "iterative"}),
              "dynamic elements": dict(dynamic, **FEM, **{"Implicit solver/Time step": "1e-4*t_1"}),
              "explicit": dict(dynamic, Method="mpm", **{"Stages/consolidation/Scheme": "explicit"}),
              "semi-implicit": dict(dynamic, Method="mpm", **{"Stages/consolidation/Scheme": "semi-implicit",

@@ -62,7 +62,10 @@ UpSolver<dim>::UpSolver(const ImplicitParameters &parameters, const LinearSolver
 {}
 
 template <int dim>
-UpSolver<dim>::~UpSolver() = default;
+UpSolver<dim>::~UpSolver()
+{
+  linear_solver.reinit({}); // a preconditioner goes before its matrix
+}
 
 template <int dim>
 void UpSolver<dim>::prepare()
@@ -149,6 +152,7 @@ void UpSolver<dim>::resize()
   for (const auto index : owned)
     pattern.add(index, index);
   dealii::SparsityTools::distribute_sparsity_pattern(pattern, owned, communicator, relevant);
+  linear_solver.reinit({});
   matrix.clear();
   matrix.reinit(unknowns.owned(), pattern, communicator);
   matrix_is_valid = false;

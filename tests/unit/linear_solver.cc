@@ -144,9 +144,13 @@ BOOST_AUTO_TEST_CASE(iterations_on_finer_meshes)
     const unsigned int few = iterations(setting, dimension);
     setting.n_cells = fine;
     const unsigned int many = iterations(setting, dimension);
-    BOOST_TEST(many <= bound, name(setting) + ": " + std::to_string(many) + " iterations");
-    BOOST_TEST(many <= few + most_more, name(setting) + ": " + std::to_string(many) + " iterations, and " +
-                                            std::to_string(few) + " on the coarser mesh");
+    // Aggregates and sweeps of the smoother end at the borders of ranks.
+    const bool parallel = dealii::Utilities::MPI::n_mpi_processes(MPI_COMM_WORLD) > 1;
+    BOOST_TEST(many <= bound + (parallel ? 8 : 0),
+               name(setting) + ": " + std::to_string(many) + " iterations");
+    BOOST_TEST(many <= few + most_more + (parallel ? 3 : 0), name(setting) + ": " + std::to_string(many) +
+                                                                 " iterations, and " + std::to_string(few) +
+                                                                 " on the coarser mesh");
   };
   const std::integral_constant<int, 2> plane;
   const std::integral_constant<int, 3> solid;
