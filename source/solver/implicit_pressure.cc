@@ -398,6 +398,12 @@ void ImplicitPressure<dim>::make_multigrid()
     star.set(first + k, first + k, own);
   }
   star.compress(dealii::VectorOperation::insert);
+  // ML adds 1e-12 to the diagonal of the coarsest level, whatever stands there; these are small numbers. To
+  // conjugate gradients the factor means nothing.
+  double largest = 0.;
+  for (std::size_t k = 0; k < sums.storage.size(); ++k)
+    largest = std::max(largest, star.diag_element(first + k));
+  star *= 1. / dealii::Utilities::MPI::max(largest, communicator);
 
   Teuchos::ParameterList list;
   ML_Epetra::SetDefaults("SA", list);

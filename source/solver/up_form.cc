@@ -323,9 +323,11 @@ void PointForm<dim, reach>::add_split(const TimeLevel &level, const bool has_pre
   system.constraints.distribute_local_to_global(shear, displacements, split.shear);
   for (unsigned int k = 0; k < Matrices::n_psi; ++k) {
     const auto number = split.next++;
-    for (unsigned int i = 0; i < n_u; ++i)
-      if (!system.constraints.is_constrained(displacements[i]))
-        split.gradient.add(displacements[i], number, volumetric.gradient(k, i));
+    for (unsigned int i = 0; i < n_u; ++i) {
+      const auto row = equation_of(system.constraints, displacements[i]);
+      if (!system.constraints.is_constrained(row))
+        split.gradient.add(row, number, volumetric.gradient(k, i));
+    }
     split.volumetric_compliance(number) = norms[k] / (level.share * volumetric.modulus[k]);
     split.shear_compliance(number) = norms[k] / (2. * level.share * volumetric.shear_modulus);
     for (unsigned int i = 0; i < n_p && has_pressure; ++i)

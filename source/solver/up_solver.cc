@@ -62,7 +62,10 @@ UpSolver<dim>::UpSolver(const ImplicitParameters &parameters, const LinearSolver
 {}
 
 template <int dim>
-UpSolver<dim>::~UpSolver() = default;
+UpSolver<dim>::~UpSolver()
+{
+  linear_solver.reinit({}); // a preconditioner goes before its matrix
+}
 
 template <int dim>
 void UpSolver<dim>::prepare()
@@ -118,7 +121,7 @@ template <int dim>
 void UpSolver<dim>::resize()
 {
   const MPI_Comm communicator = grid.communicator();
-  dealii::BlockDynamicSparsityPattern pattern(unknowns.relevant());
+  dealii::BlockDynamicSparsityPattern pattern(boundary.relevant());
   std::vector<typename Space<dim>::Index> list;
   for (const auto &body : scene.bodies)
     for (const Slice &slice : body->slices()) {
@@ -143,12 +146,13 @@ void UpSolver<dim>::resize()
   dealii::IndexSet owned(unknowns.n_unknowns()), relevant(unknowns.n_unknowns());
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
     owned.add_indices(unknowns.owned()[b], b * unknowns.first_pressure());
-    relevant.add_indices(unknowns.relevant()[b], b * unknowns.first_pressure());
+    relevant.add_indices(boundary.relevant()[b], b * unknowns.first_pressure());
   }
   // Unknowns on a rank's edge whose cells lie on other ranks have no entry yet, and need a diagonal.
   for (const auto index : owned)
     pattern.add(index, index);
   dealii::SparsityTools::distribute_sparsity_pattern(pattern, owned, communicator, relevant);
+  linear_solver.reinit({});
   matrix.clear();
   matrix.reinit(unknowns.owned(), pattern, communicator);
   matrix_is_valid = false;
@@ -193,6 +197,7 @@ void UpSolver<dim>::describe_unknowns()
   for (const auto &body : scene.bodies)
     form->sum_inertia(*body, mass_diagonal);
   mass_diagonal.compress(dealii::VectorOperation::add);
+  boundary.gather(mass_diagonal);
   const double largest = mass_diagonal.linfty_norm();
   for (const auto index : owned)
     if (mass_diagonal(index) == 0.)
@@ -221,7 +226,7 @@ void UpSolver<dim>::prepare_split()
   split = std::make_unique<VolumetricSplit>();
   split->first = first;
   const dealii::IndexSet &u = unknowns.owned()[0];
-  dealii::TrilinosWrappers::SparsityPattern gradient(u, functions, unknowns.relevant()[0], communicator);
+  dealii::TrilinosWrappers::SparsityPattern gradient(u, functions, boundary.relevant()[0], communicator);
   std::unique_ptr<dealii::TrilinosWrappers::SparsityPattern> projection;
   if (unknowns.has_pressure())
     projection = std::make_unique<dealii::TrilinosWrappers::SparsityPattern>(functions, unknowns.owned()[1],
@@ -232,8 +237,10 @@ void UpSolver<dim>::prepare_split()
       for (auto &number : own)
         number = first++;
       const auto *cell = unknowns.displacements(slice.cell);
-      for (unsigned int i = 0; i < unknowns.n_cell_nodes() * dim; ++i)
+      for (unsigned int i = 0; i < unknowns.n_cell_nodes() * dim; ++i) {
         gradient.add_entries(cell[i], own.begin(), own.end());
+        gradient.add_entries(equation_of(boundary.constraints(), cell[i]), own.begin(), own.end());
+      }
       if (!projection || !body->material().mixture())
         continue;
       for (unsigned int i = 0; i < Space<dim>::n_pressures; ++i)
@@ -335,7 +342,7 @@ void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
   contact.assemble(level, state, system);
   residual.compress(dealii::VectorOperation::add);
   right_side = residual;
-  boundary.constraints().set_zero(right_side);
+  boundary.condense(right_side);
   if (!with_matrix)
     return;
   fill_empty_diagonal(level);
@@ -423,7 +430,7 @@ void UpSolver<dim>::solve(const TimeLevel &level, const double start, const doub
     correction = 0.;
     const auto solve_system = [&](BlockVector &solution, const BlockVector &forces) {
       done.linear_iterations += linear_solver.solve(solution, forces);
-      boundary.constraints().set_zero(solution);
+      boundary.distribute(solution);
       ++done.linear_solves;
     };
     solve_system(correction, right_side);

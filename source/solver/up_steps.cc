@@ -98,10 +98,11 @@ void UpSolver<dim>::start(const Mode stage_mode)
   for (const auto &body : scene.bodies)
     form->add_momentum(*body, right_side.block(0));
   right_side.compress(dealii::VectorOperation::add);
-  boundary.constraints().set_zero(right_side);
+  boundary.condense(right_side);
   correction = 0.;
   if (right_side.l2_norm() > 0.)
     linear_solver.solve(correction, right_side);
+  boundary.distribute(correction);
   rate.block(0) = correction.block(0);
   boundary.prescribe_velocity(now, 1e-3 * suggested_step().dt, rate.block(0));
 
@@ -113,6 +114,7 @@ void UpSolver<dim>::start(const Mode stage_mode)
   correction = 0.;
   if (right_side.l2_norm() > 0.)
     linear_solver.solve(correction, right_side);
+  boundary.distribute(correction);
   second.block(0) = correction.block(0);
   if (unknowns.has_pressure())
     rate.block(1) = correction.block(1);
@@ -304,7 +306,7 @@ dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const
     if (mass(index) > 0.)
       velocity(index) /= mass(index);
   velocity.compress(dealii::VectorOperation::insert);
-  boundary.constraints().set_zero(velocity);
+  boundary.distribute(velocity);
   return velocity;
 }
 

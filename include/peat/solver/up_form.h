@@ -80,6 +80,14 @@ struct VolumetricSplit
   void compress();
 };
 
+/// The unknown in whose equation an unknown of displacement counts: itself, or the one that it is tied to.
+inline dealii::types::global_dof_index equation_of(const dealii::AffineConstraints<double> &constraints,
+                                                   const dealii::types::global_dof_index unknown)
+{
+  const auto *entries = constraints.get_constraint_entries(unknown);
+  return entries && !entries->empty() ? entries->front().first : unknown;
+}
+
 /// What assemble() adds to; null what is not wanted.
 struct UpSystem
 {
