@@ -78,8 +78,10 @@ void UpSolver<dim>::prepare()
       if (body->material().mixture() && method != Method::points_at_rest)
         saturated.push_back(slice.cell);
     }
-  for (const auto &body : scene.bodies)
+  for (const auto &body : scene.bodies) {
     body->accept_cells();
+    form->survey(*body);
+  }
   sort(solid);
   sort(saturated);
   unknowns.distribute(solid, saturated);
@@ -386,6 +388,15 @@ double UpSolver<dim>::residual_norm(const unsigned int block, const double toler
 }
 
 template <int dim>
+double UpSolver<dim>::residual_size(const double tolerance) const
+{
+  double squared = 0.;
+  for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
+    squared += std::pow(residual_norm(b, tolerance), 2);
+  return std::sqrt(squared);
+}
+
+template <int dim>
 bool UpSolver<dim>::converged(const double tolerance) const
 {
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
@@ -431,7 +442,7 @@ void UpSolver<dim>::solve(const TimeLevel &level, const double start, const doub
     ++done.newton_iterations;
     unknown += correction;
     if (!linear)
-      line_search(level, right_side.l2_norm());
+      line_search(level, residual_size(tolerance));
     share_unknown();
     contact.augment(state);
   }
@@ -454,12 +465,13 @@ void UpSolver<dim>::give_up(const unsigned int iterations, const double start, c
 template <int dim>
 void UpSolver<dim>::line_search(const TimeLevel &level, const double before)
 {
-  // Full steps unless they make things worse.
+  // Full steps unless they make things worse. Force and volume are no number together: a stage begins with
+  // forces that are in balance and volumes that are not.
   constexpr unsigned int most_halvings = 5;
   double length = 1.;
   for (unsigned int k = 0; k < most_halvings; ++k) {
     assemble(level, false);
-    const double after = right_side.l2_norm();
+    const double after = residual_size(parameters.newton_tolerance);
     // Where sites touch or part it is the next iteration that knows their forces.
     if (std::isfinite(after) && (after <= before || contact.changes_matrix()))
       return;
@@ -542,6 +554,24 @@ bool UpSolver<dim>::reach_changes()
 }
 
 template <int dim>
+bool UpSolver<dim>::surfaces_change()
+{
+  const auto prescribed = [&] {
+    std::vector<dealii::types::global_dof_index> unknowns;
+    for (const auto &line : boundary.constraints().get_lines())
+      unknowns.push_back(line.index);
+    return unknowns;
+  };
+  const auto before = prescribed();
+  for (auto &[name, tracers] : scene.surfaces) {
+    tracers.settle(scene.body(name), active);
+    tracers.locate(active);
+  }
+  boundary.locate(active, small_nodes.unused());
+  return dealii::Utilities::MPI::max(int(prescribed() != before), grid.communicator()) > 0;
+}
+
+template <int dim>
 void UpSolver<dim>::relocate_points()
 {
   int changed = 0, leaves = 0;
@@ -576,11 +606,12 @@ void UpSolver<dim>::relocate_points()
   changed = dealii::Utilities::MPI::max(changed | leaves, grid.communicator());
   // Domains may reach nodes now that they did not reach before.
   if (!changed)
-    changed = reach_changes() || contact.is_outdated() || boundary.cover_changes();
+    changed = reach_changes() || contact.is_outdated() || boundary.cover_changes() || surfaces_change();
   if (changed)
-    prepare();
-  else
-    matrix_is_valid = false;
+    return prepare();
+  for (const auto &body : scene.bodies)
+    form->survey(*body);
+  matrix_is_valid = false;
 }
 
 template class UpSolver<2>;
