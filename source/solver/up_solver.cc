@@ -521,31 +521,6 @@ void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
 }
 
 template <int dim>
-void UpSolver<dim>::move_tracers()
-{
-  if (method == Method::finite_elements) {
-    if (!scene.probes)
-      return;
-    ghosted_total = total;
-    scene.probes->place(
-        [&](const dealii::Point<dim> &x) { return unknowns.value(ghosted_total.block(0), x); });
-    return;
-  }
-  // Tracers know vertices only; what lies between is what the points see, too.
-  std::vector<double> step(std::size_t(active.size()) * dim, 0.);
-  for (unsigned int i = 0; i < active.size(); ++i)
-    if (const auto *node = unknowns.node_at(active.grid_node(i)))
-      for (unsigned int d = 0; d < dim; ++d)
-        step[std::size_t(i) * dim + d] = state.unknown.block(0)(node->displacement[d]);
-  for (auto &[name, tracers] : scene.surfaces)
-    tracers.move(step, 1., scene.body(name).material().law().finite_strain(), active);
-  if (scene.probes) {
-    scene.probes->locate(active);
-    scene.probes->move(step, 1., false, active);
-  }
-}
-
-template <int dim>
 bool UpSolver<dim>::reach_changes()
 {
   const auto before = small_nodes.unused();
