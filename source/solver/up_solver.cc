@@ -81,8 +81,10 @@ void UpSolver<dim>::prepare()
       if (body->material().mixture() && method != Method::points_at_rest)
         saturated.push_back(slice.cell);
     }
-  for (const auto &body : scene.bodies)
+  for (const auto &body : scene.bodies) {
     body->accept_cells();
+    form->survey(*body);
+  }
   sort(solid);
   sort(saturated);
   unknowns.distribute(solid, saturated);
@@ -393,6 +395,15 @@ double UpSolver<dim>::residual_norm(const unsigned int block, const double toler
 }
 
 template <int dim>
+double UpSolver<dim>::residual_size(const double tolerance) const
+{
+  double squared = 0.;
+  for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
+    squared += std::pow(residual_norm(b, tolerance), 2);
+  return std::sqrt(squared);
+}
+
+template <int dim>
 bool UpSolver<dim>::converged(const double tolerance) const
 {
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
@@ -438,7 +449,7 @@ void UpSolver<dim>::solve(const TimeLevel &level, const double start, const doub
     ++done.newton_iterations;
     unknown += correction;
     if (!linear)
-      line_search(level, right_side.l2_norm());
+      line_search(level, residual_size(tolerance));
     share_unknown();
     contact.augment(state);
   }
@@ -461,12 +472,13 @@ void UpSolver<dim>::give_up(const unsigned int iterations, const double start, c
 template <int dim>
 void UpSolver<dim>::line_search(const TimeLevel &level, const double before)
 {
-  // Full steps unless they make things worse.
+  // Full steps unless they make things worse. Force and volume are no number together: a stage begins with
+  // forces that are in balance and volumes that are not.
   constexpr unsigned int most_halvings = 5;
   double length = 1.;
   for (unsigned int k = 0; k < most_halvings; ++k) {
     assemble(level, false);
-    const double after = right_side.l2_norm();
+    const double after = residual_size(parameters.newton_tolerance);
     // Where sites touch or part it is the next iteration that knows their forces.
     if (std::isfinite(after) && (after <= before || contact.changes_matrix()))
       return;
@@ -516,36 +528,29 @@ void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
 }
 
 template <int dim>
-void UpSolver<dim>::move_tracers()
-{
-  if (method == Method::finite_elements) {
-    if (!scene.probes)
-      return;
-    ghosted_total = total;
-    scene.probes->place(
-        [&](const dealii::Point<dim> &x) { return unknowns.value(ghosted_total.block(0), x); });
-    return;
-  }
-  // Tracers know vertices only; what lies between is what the points see, too.
-  std::vector<double> step(std::size_t(active.size()) * dim, 0.);
-  for (unsigned int i = 0; i < active.size(); ++i)
-    if (const auto *node = unknowns.node_at(active.grid_node(i)))
-      for (unsigned int d = 0; d < dim; ++d)
-        step[std::size_t(i) * dim + d] = state.unknown.block(0)(node->displacement[d]);
-  for (auto &[name, tracers] : scene.surfaces)
-    tracers.move(step, 1., scene.body(name).material().law().finite_strain(), active);
-  if (scene.probes) {
-    scene.probes->locate(active);
-    scene.probes->move(step, 1., false, active);
-  }
-}
-
-template <int dim>
 bool UpSolver<dim>::reach_changes()
 {
   const auto before = small_nodes.unused();
   survey_nodes();
   return dealii::Utilities::MPI::max(int(small_nodes.unused() != before), grid.communicator());
+}
+
+template <int dim>
+bool UpSolver<dim>::surfaces_change()
+{
+  const auto prescribed = [&] {
+    std::vector<dealii::types::global_dof_index> unknowns;
+    for (const auto &line : boundary.constraints().get_lines())
+      unknowns.push_back(line.index);
+    return unknowns;
+  };
+  const auto before = prescribed();
+  for (auto &[name, tracers] : scene.surfaces) {
+    tracers.settle(scene.body(name), active);
+    tracers.locate(active);
+  }
+  boundary.locate(active, small_nodes.unused());
+  return dealii::Utilities::MPI::max(int(prescribed() != before), grid.communicator()) > 0;
 }
 
 template <int dim>
@@ -583,11 +588,12 @@ void UpSolver<dim>::relocate_points()
   changed = dealii::Utilities::MPI::max(changed | leaves, grid.communicator());
   // Domains may reach nodes now that they did not reach before.
   if (!changed)
-    changed = reach_changes() || contact.is_outdated() || boundary.cover_changes();
+    changed = reach_changes() || contact.is_outdated() || boundary.cover_changes() || surfaces_change();
   if (changed)
-    prepare();
-  else
-    matrix_is_valid = false;
+    return prepare();
+  for (const auto &body : scene.bodies)
+    form->survey(*body);
+  matrix_is_valid = false;
 }
 
 template class UpSolver<2>;

@@ -6,9 +6,9 @@
 
 #include <sstream>
 
-// The levels of time at which the equations hold: static, those of a diagonally implicit Runge-Kutta method
-// (quasi-static, and the dynamics of material points), and dynamic finite elements (generalised-alpha;
-// theory.md, implicit solvers).
+// Steps: the levels of time at which the equations hold: static, those of a diagonally implicit Runge-Kutta
+// method (quasi-static, and the dynamics of material points), and dynamic finite elements (generalised-alpha;
+// theory.md, implicit solvers); and what goes along with the points after one.
 
 namespace peat {
 namespace {
@@ -498,6 +498,31 @@ void UpSolver<dim>::reset_displacements()
   total = 0.;
 }
 
+template <int dim>
+void UpSolver<dim>::move_tracers()
+{
+  if (method == Method::finite_elements) {
+    if (!scene.probes)
+      return;
+    ghosted_total = total;
+    scene.probes->place(
+        [&](const dealii::Point<dim> &x) { return unknowns.value(ghosted_total.block(0), x); });
+    return;
+  }
+  // Tracers know vertices only; what lies between is what the points see, too.
+  std::vector<double> step(std::size_t(active.size()) * dim, 0.);
+  for (unsigned int i = 0; i < active.size(); ++i)
+    if (const auto *node = unknowns.node_at(active.grid_node(i)))
+      for (unsigned int d = 0; d < dim; ++d)
+        step[std::size_t(i) * dim + d] = state.unknown.block(0)(node->displacement[d]);
+  for (auto &[name, tracers] : scene.surfaces)
+    tracers.move(step, 1., scene.body(name).material().law().finite_strain(), active);
+  if (scene.probes) {
+    scene.probes->locate(active);
+    scene.probes->move(step, 1., false, active);
+  }
+}
+
 #define PEAT_INSTANTIATE(dim)                                                                                \
   template void UpSolver<dim>::set_horizontal_stress(double);                                                \
   template void UpSolver<dim>::reset_displacements();                                                        \
@@ -517,7 +542,8 @@ void UpSolver<dim>::reset_displacements()
                                          const dealii::TrilinosWrappers::MPI::Vector &);                     \
   template double UpSolver<dim>::estimated_error(const BlockVector &);                                       \
   template dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const;                       \
-  template TimeLevel UpSolver<dim>::stage_level(double, bool) const;
+  template TimeLevel UpSolver<dim>::stage_level(double, bool) const;                                         \
+  template void UpSolver<dim>::move_tracers();
 PEAT_INSTANTIATE(2)
 PEAT_INSTANTIATE(3)
 #undef PEAT_INSTANTIATE

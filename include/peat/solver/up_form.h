@@ -122,6 +122,10 @@ public:
   /// Functions psi of a body in a cell; 0 without projection.
   virtual unsigned int n_volumetric() const = 0;
 
+  /// To be called for each body after its points have moved, before its part of the system is added.
+  /// Collective.
+  virtual void survey(const Body<dim> &body) = 0;
+
   /// Add the body's part of the system. Pressures act with their means over cells where the space has no
   /// pressure for a saturated body.
   virtual void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
