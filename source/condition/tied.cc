@@ -10,10 +10,10 @@
 namespace peat {
 namespace {
 template <int dim>
-class Tied : public Condition<dim>
+class TiedNodes : public Condition<dim>
 {
 public:
-  Tied(Section section, const Place<dim> &place) : Condition<dim>(section, place)
+  TiedNodes(Section section, const Place<dim> &place) : Condition<dim>(section, place)
   {
     const std::vector<std::string> axes =
         dim == 2 ? std::vector<std::string>{"x", "y"} : std::vector<std::string>{"x", "y", "z"};
@@ -75,9 +75,8 @@ private:
   std::array<bool, dim> tied{};
   std::vector<std::uint32_t> members;
 };
-const ConditionMember<Tied>
-    tied("tied",
-         "the nodes move as one, as under a rigid plate that does not turn; of what acts on them the sum "
-         "counts.");
+const ConditionMember<TiedNodes> tied_nodes(
+    "tied", "the nodes move as one, as under a rigid plate that does not turn; of what acts on them the sum "
+            "counts.");
 } // namespace
 } // namespace peat
