@@ -536,24 +536,6 @@ bool UpSolver<dim>::reach_changes()
 }
 
 template <int dim>
-bool UpSolver<dim>::surfaces_change()
-{
-  const auto prescribed = [&] {
-    std::vector<dealii::types::global_dof_index> unknowns;
-    for (const auto &line : boundary.constraints().get_lines())
-      unknowns.push_back(line.index);
-    return unknowns;
-  };
-  const auto before = prescribed();
-  for (auto &[name, tracers] : scene.surfaces) {
-    tracers.settle(scene.body(name), active);
-    tracers.locate(active);
-  }
-  boundary.locate(active, small_nodes.unused());
-  return dealii::Utilities::MPI::max(int(prescribed() != before), grid.communicator()) > 0;
-}
-
-template <int dim>
 void UpSolver<dim>::relocate_points()
 {
   int changed = 0, leaves = 0;

@@ -523,6 +523,24 @@ void UpSolver<dim>::move_tracers()
   }
 }
 
+template <int dim>
+bool UpSolver<dim>::surfaces_change()
+{
+  const auto prescribed = [&] {
+    std::vector<dealii::types::global_dof_index> unknowns;
+    for (const auto &line : boundary.constraints().get_lines())
+      unknowns.push_back(line.index);
+    return unknowns;
+  };
+  const auto before = prescribed();
+  for (auto &[name, tracers] : scene.surfaces) {
+    tracers.settle(scene.body(name), active);
+    tracers.locate(active);
+  }
+  boundary.locate(active, small_nodes.unused());
+  return dealii::Utilities::MPI::max(int(prescribed() != before), grid.communicator()) > 0;
+}
+
 #define PEAT_INSTANTIATE(dim)                                                                                \
   template void UpSolver<dim>::set_horizontal_stress(double);                                                \
   template void UpSolver<dim>::reset_displacements();                                                        \
@@ -543,7 +561,8 @@ void UpSolver<dim>::move_tracers()
   template double UpSolver<dim>::estimated_error(const BlockVector &);                                       \
   template dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const;                       \
   template TimeLevel UpSolver<dim>::stage_level(double, bool) const;                                         \
-  template void UpSolver<dim>::move_tracers();
+  template void UpSolver<dim>::move_tracers();                                                               \
+  template bool UpSolver<dim>::surfaces_change();
 PEAT_INSTANTIATE(2)
 PEAT_INSTANTIATE(3)
 #undef PEAT_INSTANTIATE
