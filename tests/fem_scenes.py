@@ -166,15 +166,15 @@ def tied(c):
             settings = dict(few, **{"Probes/side/Point": "a - h/3, b/2 - h/3" + third}, **kind)
             if third:
                 settings["Constants/cells"] = 6
-            runs = [c.run(scene, settings, ranks=n) for n in c.rank_counts]
-            for n, run in zip(c.rank_counts[1:], runs[1:]):
-                difference, column = compare_tables(runs[0].directory + "/probes.csv", run.directory + "/probes.csv")
-                c.below("%s, %s, %d ranks (%s)" % (scene, name, n, column), difference, 1e-7)
+            n = c.rank_counts[-1]
+            runs = [c.run(scene, settings, ranks=1), c.run(scene, settings, ranks=n)]
+            difference, column = compare_tables(runs[0].directory + "/probes.csv", runs[1].directory + "/probes.csv")
+            c.below("%s, %s, %d ranks (%s)" % (scene, name, n, column), difference, 1e-7)
             uneven = c.run(scene, dict(settings, **{"Conditions/force/Value": "0, -2*F/a^2*x" + (", 0" if third else "")}))
             difference, column = compare_tables(runs[0].directory + "/probes.csv", uneven.directory + "/probes.csv")
-            # In explicit steps the force stands where the surface is, which leaves the plate's nodes by 1e-4 of a cell.
+            # On material points the force stands where the surface is, which leaves the plate's nodes by 1e-4 of a cell.
             c.below("%s, %s, uneven force (%s)" % (scene, name, column), difference,
-                    1e-4 if kind.get("Stages/consolidation/Scheme") else 1e-7)
+                    1e-4 if kind["Method"] == "mpm" else 1e-7)
             if third and name != "dynamic elements":
                 flat = c.run("P4_mandel", dict(settings, **{"Probes/side/Point": "a - h/3, b/2 - h/3"}))
                 a, b = flat.table("probes.csv"), runs[0].table("probes.csv")
