@@ -363,7 +363,7 @@ CASES = {
     "P4_early": (p4_early, ("full",), 60),
     "tied": (tied, ("full",), 60),
     "fem_P5": (lambda c: p5(c, 8, FEM, 5e-3, 3e-3), ("full",), 60),
-    "fem_P5_points": (lambda c: p5(c, 8, MPM, 2e-2, 1e-2), (), 300),
+    "fem_P5_points": (lambda c: p5(c, 16, MPM, 2e-2, 1e-2), (), 300),
     "fem_D1": (d1, ("full",), 20),
     "fem_D2": (d2, ("quick", "full"), 2),
     "fem_D3": (d3, ("full",), 8),
