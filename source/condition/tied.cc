@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "components.h"
+
 // What a rigid plate does to the ground that it lies on: nodes move as one, under whatever acts on all of
 // them together.
 
@@ -15,10 +17,8 @@ class TiedNodes : public Condition<dim>
 public:
   TiedNodes(Section section, const Place<dim> &place) : Condition<dim>(section, place)
   {
-    const std::vector<std::string> axes =
-        dim == 2 ? std::vector<std::string>{"x", "y"} : std::vector<std::string>{"x", "y", "z"};
     std::vector<std::string> components;
-    section.add("Components", components, axes,
+    section.add("Components", components, axis_names<dim>(),
                 "The components of the motion that all nodes have in common; the others stay free.");
     if (section.describing())
       return;
@@ -26,14 +26,7 @@ public:
       section.fail("Where", "nodes are tied on faces of the mesh or in a region, not on a body's surface; a "
                             "'Region' can hold the nodes that the surface runs through");
     section.require("Components", "condition '" + section.name() + "'");
-    if (components.empty())
-      section.fail("Components", "name at least one component");
-    for (unsigned int d = 0; d < dim; ++d) {
-      const auto n = std::count(components.begin(), components.end(), axes[d]);
-      if (n > 1)
-        section.fail("Components", "'" + axes[d] + "' stands twice");
-      tied[d] = n == 1;
-    }
+    tied = named_components<dim>(section, components);
   }
 
   bool ties(const unsigned int component) const override { return tied[component]; }

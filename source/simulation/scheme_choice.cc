@@ -250,8 +250,7 @@ Demand demand(const Case<dim> &parameters, const StageParameters &stage, const S
     text.precision(2);
     text << "; the stage lasts " << periods
          << " periods of the gravest one, more than any scheme keeps in phase: if they do not matter, "
-            "'Solver = "
-            "quasi-static' does without";
+            "'Solver = quasi-static' does without";
     result.why += text.str();
   }
   result.changes = dealii::Utilities::MPI::max(result.changes, grid.communicator());

@@ -191,7 +191,7 @@ double largest_closeness(const TrilinosMatrix &stiffness, const std::vector<std:
 } // namespace
 
 void Multigrid::build(const TrilinosMatrix &matrix, const std::vector<double> &modes,
-                      std::vector<std::vector<double>> &places)
+                      const std::vector<std::vector<double>> &places)
 {
   const unsigned int dim = places.size();
   Teuchos::ParameterList list = multigrid_settings();

@@ -56,7 +56,7 @@ public:
   /// Displacements, whose stiffnesses are large numbers; modes [n_modes * n_owned] span the near-null space,
   /// places are those of the nodes, by direction, in steps from node to node. Both must live as long as this.
   void build(const TrilinosMatrix &matrix, const std::vector<double> &modes,
-             std::vector<std::vector<double>> &places);
+             const std::vector<std::vector<double>> &places);
   void vmult(TrilinosVector &result, const TrilinosVector &source) const;
 
 private:

@@ -62,10 +62,7 @@ UpSolver<dim>::UpSolver(const ImplicitParameters &parameters, const LinearSolver
 {}
 
 template <int dim>
-UpSolver<dim>::~UpSolver()
-{
-  linear_solver.reinit({}); // a preconditioner goes before its matrix
-}
+UpSolver<dim>::~UpSolver() = default;
 
 template <int dim>
 void UpSolver<dim>::prepare()
@@ -154,7 +151,7 @@ void UpSolver<dim>::resize()
   for (const auto index : owned)
     pattern.add(index, index);
   dealii::SparsityTools::distribute_sparsity_pattern(pattern, owned, communicator, relevant);
-  linear_solver.reinit({});
+  linear_solver.reinit({}); // a preconditioner goes before its matrix
   matrix.clear();
   matrix.reinit(unknowns.owned(), pattern, communicator);
   matrix_is_valid = false;

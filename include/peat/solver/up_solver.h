@@ -154,11 +154,11 @@ private:
   SmallNodes<dim> small_nodes;
   ImplicitContact<dim> contact;
   UpBoundary<dim> boundary;
-  LinearSolver linear_solver;
   BlockMatrix matrix;
   dealii::TrilinosWrappers::SparseMatrix pressure_mass;
   std::unique_ptr<VolumetricSplit> split;
   dealii::TrilinosWrappers::MPI::Vector inertia, mass_diagonal;
+  LinearSolver linear_solver; ///< after what its preconditioner refers to, and so destroyed before it
   bool matrix_is_valid = false;
   bool matrix_is_near = false; ///< to the one of `matrix_level` that the linear solver saw last
   TimeLevel matrix_level;
