@@ -375,7 +375,7 @@ CASES = {
     "fem_D6": (lambda c: d6(c, 8, FEM, 1e-2), ("full",), 270),
     "fem_D6_points": (lambda c: d6(c, 8, MPM, 5e-2), (), 300),
     "fem_D7": (d7, ("full",), 20),
-    "fem_S7": (s7, ("quick", "full"), 5),
+    "fem_S7": (s7, ("full",), 5),
     "rest": (rest, ("full",), 20),
     "parallel_implicit": (parallel_implicit, ("full",), 20),
     "fem_G1": (g1, ("quick", "full"), 5),

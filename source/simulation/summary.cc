@@ -39,7 +39,7 @@ void Simulation<dim>::write_summary() const
   if (dealii::Utilities::MPI::this_mpi_process(communicator) != 0)
     return;
 
-  const double n_ranks = dealii::Utilities::MPI::n_mpi_processes(communicator);
+  const unsigned int n_ranks = dealii::Utilities::MPI::n_mpi_processes(communicator);
   const double n_points = scene.n_global_points();
   nlohmann::ordered_json summary;
   summary["version"] = PEAT_VERSION;
