@@ -214,18 +214,21 @@ def least_squares(columns, y):
 
 
 def fit_decay(t, y, rates):
-    """Fit y = (A cos wt + B sin wt) exp(-a t) + C exp(-c t); from first guesses (a, w, c) to the best values."""
+    """Fit y = (A cos wt + B sin wt) exp(-a t) + C exp(-c t); from first guesses (a, w, c) to the best values.
+
+    Without c: the first of the two terms alone.
+    """
     def residual(p):
-        a, w, c = p
-        columns = [[math.exp(-a * s) * math.cos(w * s) for s in t], [math.exp(-a * s) * math.sin(w * s) for s in t],
-                   [math.exp(-c * s) for s in t]]
+        a, w = p[:2]
+        columns = [[math.exp(-a * s) * math.cos(w * s) for s in t], [math.exp(-a * s) * math.sin(w * s) for s in t]]
+        columns += [[math.exp(-c * s) for s in t] for c in p[2:]]
         return least_squares(columns, y)[1]
 
     p = list(rates)
     for _ in range(12):
         r = residual(p)
         columns = []
-        for k in range(3):
+        for k in range(len(p)):
             step = 1e-6 * abs(p[k])
             q = p[:k] + [p[k] + step] + p[k + 1:]
             columns.append([(b - a) / step for a, b in zip(r, residual(q))])
@@ -234,6 +237,29 @@ def fit_decay(t, y, rates):
         if max(abs(d / v) for v, d in zip(p, change)) < 1e-10:
             break
     return p
+
+
+def standing_wave_rates(k, b=math.pi, E=1e7, nu=0.3, n=0.4, rho_s=2650., rho_f=1000., K_f=2.2e8, g=9.81):
+    """Decay and frequency of the wave u = U(t) sin(b y), p = P(t) cos(b y) in saturated soil, and decay of what is left [1/s].
+
+    Of U, P ~ exp(s t) in the u-p equations: rho s^2 U = -M b^2 U + b P, s P/Q = -K b^2 P + K rho_f b s^2 U - b s U. The
+    values of D5_standing_wave.prm, with conductivities k for which there is a wave.
+    """
+    M, Q, K = E * (1. - nu) / ((1. + nu) * (1. - 2. * nu)), K_f / n, k / (rho_f * g)
+    rho = n * rho_f + (1. - n) * rho_s
+    c = [rho / Q, K * b * b * (rho - rho_f), b * b * (M / Q + 1.), M * K * b**4]
+    size = max(c[1] / c[0], math.sqrt(c[2] / c[0]), (c[3] / c[0])**(1. / 3.))
+    roots = [size * (0.4 + 0.9j)**i for i in range(3)]
+    for _ in range(200):
+        for i in range(3):
+            s = roots[i]
+            change = (((c[0] * s + c[1]) * s + c[2]) * s + c[3]) / c[0]
+            for j in range(3):
+                if j != i:
+                    change /= s - roots[j]
+            roots[i] -= change
+    wave, rest = max(roots, key=lambda s: s.imag), min(roots, key=lambda s: abs(s.imag))
+    return -wave.real, wave.imag, -rest.real
 
 
 def amplitude(t, y, w):
