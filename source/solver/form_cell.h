@@ -31,6 +31,7 @@ public:
     StressLanes stress;     ///< that acts: with the projected mean
     std::array<Lanes, max_state_columns> memory;
     std::array<Lanes, dim> acceleration, pressure_gradient;
+    Lanes gross_acceleration; ///< what it would be if its parts did not cancel each other
     GradientLanes velocity_gradient;
     Lanes velocity_divergence, porosity, old_pressure, pressure, pressure_rate;
   };
@@ -239,11 +240,19 @@ void FormCell<dim, reach>::find_rates(const Body<dim> &body, const TimeLevel &le
   for (unsigned int c = 0; c < 9; ++c)
     at.velocity_gradient[c] += level.velocity * of_step[c];
   at.velocity_divergence = at.velocity_gradient[0] + at.velocity_gradient[4] + at.velocity_gradient[8];
+  Lanes parts = {};
   for (unsigned int d = 0; d < dim; ++d) {
-    at.acceleration[d] = level.acceleration * points.value(nodal.U, d) + points.value(nodal.a_history, d);
-    if (level.old_velocity != 0.)
-      at.acceleration[d] += level.old_velocity * points.load(layout.velocity + d);
+    const Lanes of_motion = level.acceleration * points.value(nodal.U, d),
+                of_history = points.value(nodal.a_history, d);
+    at.acceleration[d] = of_motion + of_history;
+    parts += of_motion * of_motion + of_history * of_history;
+    if (level.old_velocity != 0.) {
+      const Lanes of_velocity = level.old_velocity * points.load(layout.velocity + d);
+      at.acceleration[d] += of_velocity;
+      parts += of_velocity * of_velocity;
+    }
   }
+  at.gross_acceleration = sqrt(parts);
 
   at.old_pressure = layout.pressure >= 0 ? points.load(layout.pressure) : Lanes{};
   at.pressure = broadcast(mean_pressure);

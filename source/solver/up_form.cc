@@ -118,7 +118,8 @@ void PointForm<dim, reach>::add_residual(const Body<dim> &body, const Points &po
     for (unsigned int c = 0; c < 3; ++c)
       total[c] -= mixture->biot_coefficient() * at.pressure;
   gross[0] += sum(V * (sqrt(sum_of_squares(at.stress)) + sqrt(at.pressure * at.pressure))) /
-              space.grid().smallest_cell_size();
+                  space.grid().smallest_cell_size() +
+              sum(m * at.gross_acceleration);
   for (unsigned int i = 0; i < Points::n_nodes; ++i)
     for (unsigned int d = 0; d < dim; ++d) {
       Lanes r = points.N[i] * force[d];
@@ -157,7 +158,8 @@ void PointForm<dim, reach>::add_fluid_residual(const Body<dim> &body, const Poin
   for (unsigned int d = 0; d < dim; ++d)
     slope += at.pressure_gradient[d] * at.pressure_gradient[d];
   gross[1] += std::abs(scale) *
-              sum(mobility * sqrt(slope) / space.grid().smallest_cell_size() +
+              sum(mobility * (sqrt(slope) + mixture.fluid_density() * inertia * at.gross_acceleration) /
+                      space.grid().smallest_cell_size() +
                   V * level.pressure_rate * mixture.storage(at.porosity) * sqrt(at.pressure * at.pressure));
   std::array<Lanes, dim> flux;
   for (unsigned int d = 0; d < dim; ++d)
