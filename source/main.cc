@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <iostream>
 #include <string>
 #include <vector>
@@ -112,9 +111,6 @@ bool parse(const int argc, char **argv, const bool first_rank, CommandLine &line
 
 int main(int argc, char **argv)
 {
-  // Open MPI starts a daemon beside a program that was not started by mpirun, in case it should want to start
-  // others. This one does not, and starts sooner without.
-  setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
   dealii::Utilities::MPI::MPI_InitFinalize mpi(argc, argv, 1);
   const MPI_Comm communicator = MPI_COMM_WORLD;
   const bool first_rank = dealii::Utilities::MPI::this_mpi_process(communicator) == 0;
