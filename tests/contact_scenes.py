@@ -395,36 +395,51 @@ def i1_3d(c):
     i1_case(c, "I1_3d", 1e-5, {}, 4. * h * h, h)
 
 
-def i2_errors(c, scene, k, cells, settings, area, axis="y", begin=3.):
-    """Largest errors of velocity and averaged force, over v0 and Z_u v0, until shortly before the block lifts off. Of the force from when the
-    front has passed `begin` cells."""
+def i2_known(k):
+    """Velocity and force as functions of the time since the touch, and when the block lifts off."""
     table = read_table(os.path.join(TABLES, "I2_rigid_on_column.csv"))
     column = "K=0" if k < 1e-9 else "k=%g" % k
     known_v, known_f = table["V(%s) [m/s]" % column], table["F(%s) [Pa]" % column]
     lost = max(t for t, f in zip(table["t [s]"], known_f) if f == f)
     times = [0.] + table["t [s]"]
     v_of, f_of = [1.] + known_v, [Z_U if k < 1e-9 else known_f[0]] + known_f
+    return (lambda t: interpolate(t, times, v_of)), (lambda t: interpolate(t, times, f_of)), lost
+
+
+def i2_force_error(run, k, h, area, begin):
+    """Largest error of the averaged force over Z_u v0, from a time on until shortly before the block lifts off."""
+    force = i2_known(k)[1]
+    return max(abs(f / area(h) - force(t)) / Z_U for t, f in History(run, "impact").averaged(2. * h / C_U)
+               if begin < t < 17. / C_U)
+
+
+def i2_errors(c, scene, k, cells, settings, area, axis="y", begin=3.):
+    """Largest errors of velocity and averaged force, over v0 and Z_u v0, until shortly before the block lifts off. Of the force from when the
+    front has passed `begin` cells."""
+    known_v, _, lost = i2_known(k)
     run = c.run(scene, dict({"Constants/k": k, "Constants/cells": cells}, **settings))
     s, h = History(run, "impact"), 10. / cells
     speed = s.table["block/velocity " + axis]
     # Until shortly before the front comes back from the base: the mesh and averages blur it, and the inverse transform rings.
-    v_error = max(abs(-v - interpolate(t, times, v_of)) for t, v in zip(s.t, speed) if t < min(17. / C_U, 0.95 * lost))
-    f_error = max(abs(f / area(h) - interpolate(t, times, f_of)) / Z_U for t, f in s.averaged(2. * h / C_U)
-                  if begin * h / C_U < t < 17. / C_U)
-    return run, v_error, f_error
+    v_error = max(abs(-v - known_v(t)) for t, v in zip(s.t, speed) if t < min(17. / C_U, 0.95 * lost))
+    return run, v_error, i2_force_error(run, k, h, area, begin * h / C_U)
 
 
 def i2(c):
     for k in (1e-12, 1e-5, 1e-4, 1e-3):
-        sizes = (20, 40, 80) if k == 1e-4 else (80,)
-        found = [i2_errors(c, "I2_rigid_on_column", k, n, {}, lambda h: h) for n in sizes]
-        run, v_error, f_error = found[-1]
+        sizes = (40, 80, 160) if k == 1e-4 else (80,)
+        found = {n: i2_errors(c, "I2_rigid_on_column", k, n, {}, lambda h: h, begin=5.) for n in sizes}
+        run, v_error, f_error = found[80]
         c.below("k = %g: velocity" % k, v_error, 2e-2)
         c.below("k = %g: force" % k, f_error, 4e-2)
         c.below("k = %g: momentum" % k, run.summary["balance"]["momentum"], 1e-12)
         if len(sizes) > 1:
-            c.order("k = %g: velocity" % k, sizes, [e[1] for e in found], 0.9)
-            c.order("k = %g: force" % k, sizes, [e[2] for e in found], 0.9)
+            # Of the force at one time for all meshes, that of the tolerance on the coarsest: what is not resolved before it,
+            # the rise of the force while fluid seeps from the interface, is no error of that order.
+            begin = 5. * 10. / sizes[0] / C_U
+            forces = [i2_force_error(found[n][0], k, 10. / n, lambda h: h, begin) for n in sizes]
+            c.order("k = %g: velocity" % k, sizes, [found[n][1] for n in sizes], 0.9)
+            c.order("k = %g: force" % k, sizes, forces, 0.9)
 
 
 def i2_3d(c):
@@ -584,7 +599,7 @@ CASES = {
     "C7": (c7, (), 2),
     "I1": (i1, ("full",), 8),
     "I1_3d": (i1_3d, ("full",), 2),
-    "I2": (i2, (), 3),
+    "I2": (i2, ("full",), 4),
     "I2_3d": (i2_3d, ("quick", "full"), 2),
     "I3_discs": (i3_discs, ("full",), 5),
     "I3_block": (i3_block, (), 20),
