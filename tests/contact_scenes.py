@@ -6,6 +6,7 @@
 
 Bounds are those of the scenes' parameter files, where they are explained; a bound that differs says why beside it.
 """
+import bisect
 import os
 import sys
 from math import cos, hypot, log, pi, radians, sin, sqrt
@@ -282,6 +283,23 @@ def hertz_stresses(x, z, b, p0):
             -p0 / b * n * (m * m - z * z) / (m * m + n * n))
 
 
+def cell_means(run, body, select):
+    """Of points that `select` (place) takes: (mean place, mean stress) of each cell, weighted by mass."""
+    folder = os.path.join(run.directory, "pictures")
+    grid = scene_tools.read_vtu(os.path.join(folder, sorted(f for f in os.listdir(folder) if f.startswith("grid-"))[-1]))
+    planes = [sorted({round(x[d], 9) for x in grid["position"]}) for d in range(2)]
+    points, cells = run.points(body), {}
+    for x, stress, (m,) in zip(points["position"], points["effective stress"], points["mass"]):
+        if select(x):
+            cells.setdefault(tuple(bisect.bisect(p, u) for p, u in zip(planes, x)), []).append((m, x, stress))
+    means = []
+    for content in cells.values():
+        mass = sum(m for m, _, _ in content)
+        means.append(tuple([sum(m * f[i] for m, f in zip((m for m, _, _ in content), fields)) / mass for i in range(len(fields[0]))]
+                           for fields in ([x for _, x, _ in content], [stress for _, _, stress in content])))
+    return means
+
+
 def c5(c):
     R, E, nu, way = 0.5, 1e7, 0.3, 4.14e-3
     modulus = E / (1. - nu * nu)
@@ -291,9 +309,10 @@ def c5(c):
     load = 2. * s.mean(0.9 * end, end)
     c.below("rest in the end: change of the force", abs(s.mean(0.9 * end, end) / s.mean(0.8 * end, 0.9 * end) - 1.), 1e-3)
     b, p0 = sqrt(4. * load * R / (pi * modulus)), sqrt(load * modulus / (pi * R))
-    points, h = run.points("cylinder"), 4.3e-3
-    near = [(x[0], x[1] + R - way, stress) for x, stress in zip(points["position"], points["effective stress"])
-            if x[0] < 2. * b and x[1] + R - way < 2. * b]
+    h = 4.3e-3
+    # Stresses of single points have an error O(h) that their means over a cell do not have.
+    near = [(x[0], x[1] + R - way, stress) for x, stress in
+            cell_means(run, "cylinder", lambda x: x[0] < 2. * b and x[1] + R - way < 2. * b)]
     below = [(z, stress) for x, z, stress in near if x < h]
     shape = [hertz_stresses(0., z, b, 1.)[1] for z, _ in below]
     found = sum(f * stress[4] for f, (_, stress) in zip(shape, below)) / sum(f * f for f in shape)
@@ -307,7 +326,10 @@ def c5(c):
     c.below("vertical stress below the contact, L2", sqrt(difference / scale), 5e-2)
     shear = [(0.5 * abs(stress[4] - stress[0]), z) for z, stress in below]
     c.below("depth of the largest shear stress [h]", abs(max(shear)[1] - 0.78615 * b) / h, 1.)
-    c.below("largest shear stress", abs(max(shear)[0] / (0.30028 * p0) - 1.), 5e-2)
+    # A cylinder between two plates has more than the half-plane of Hertz: P/(pi R) of tension in both directions, by which
+    # its free surface is free, and below the contact the far plate's pressure, which takes it off the vertical stress.
+    known = 0.30028 * p0 + 0.5 * load / (pi * R)
+    c.below("largest shear stress", abs(max(shear)[0] / known - 1.), 5e-2)
     approach = 2. * load * (1. - nu * nu) / (pi * E) * (log(4. * R / b) - 0.5)
     c.below("way of the plane", abs(way / approach - 1.), 5e-2)
 
@@ -585,16 +607,16 @@ def examples(c):
 # Cases without a label miss some of their bounds, or take long; they run by name.
 CASES = {
     "C1": (c1, ("quick", "full"), 2),
-    "C1_3d": (c1_3d, (), 3),
+    "C1_3d": (c1_3d, ("full",), 3),
     "C2": (c2, ("quick", "full"), 3),
     "C3_block": (c3_block, ("full",), 5),
-    "C3_rough": (lambda c: c3_slide(c, 0.8, 2), (), 5),
+    "C3_rough": (lambda c: c3_slide(c, 0.8, 2), ("full",), 5),
     "C3_tilted": (c3_tilted, ("full",), 10),
     "C3_tilted_ground": (lambda c: c3_tilted(c, "C3_tilted_ground"), (), 60),
     "C3_roller": (c3_roller, ("full",), 60),
-    "C3_rigid_roller": (c3_rigid_roller, (), 20),
+    "C3_rigid_roller": (c3_rigid_roller, ("full",), 20),
     "C4": (c4, ("full",), 12),
-    "C5": (c5, (), 15),
+    "C5": (c5, ("full",), 15),
     "C6": (lambda c: c6(c, 16), (), 100),
     "C7": (c7, (), 2),
     "I1": (i1, ("full",), 8),
