@@ -2,6 +2,8 @@
 
 #include <deal.II/base/mpi.h>
 
+#include <cmath>
+
 namespace peat {
 template <int dim>
 BodyContact<dim>::BodyContact(const ContactParameters<dim> &parameters, const SchemeParameters &scheme,
@@ -203,12 +205,16 @@ void BodyContact<dim>::take_reactions()
 template <int dim>
 void BodyContact<dim>::finish(Ledger<dim> &book)
 {
+  // Nodes beside the edge of a body, which it hardly reaches, see none of its surface that could overlap
+  // [faces of cells].
+  constexpr double least_area = 1e-3;
   std::vector<double> sums(dim + 2, 0.);
   double gap = std::numeric_limits<double>::infinity();
   for (const ContactSite<dim> &site : sites) {
     if (!site.counts || !site.acts)
       continue;
-    gap = std::min(gap, site.gap);
+    if (site.area >= least_area * std::pow(this->grid.smallest_cell_size(), dim - 1.))
+      gap = std::min(gap, site.gap);
     if (site.impulse.norm_square() == 0.)
       continue;
     const Vector end = this->velocity(first.fields().new_velocity, site.first_surface) -

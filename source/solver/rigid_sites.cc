@@ -10,6 +10,13 @@ constexpr double margin = 2.;
 constexpr double renewal = 0.5;
 /// A line of the mesh meets the rigid body if it does not pass it at more than this [cell sizes].
 constexpr double influence = 0.5 + 1e-9;
+/// Of points that are farther from the rigid body it does not matter how its surface bends [cell sizes].
+constexpr double bending_range = 0.5;
+/// Normals that differ by no more are equal but for round-off.
+constexpr double aligned = 1e-9;
+/// Points that are farther from the rigid body than the nearest one by this do not touch it with that one
+/// [cell sizes].
+constexpr double touch_range = 0.005;
 } // namespace
 
 template <int dim>
@@ -76,49 +83,88 @@ void RigidSites<dim>::find(const ActiveNodes<dim> &nodes, const std::function<bo
 }
 
 template <int dim>
+typename RigidSites<dim>::Approach
+RigidSites<dim>::approach(const typename NearPoints<dim>::PointData &point) const
+{
+  const Vector n = rigid.normal(point.x);
+  const double distance = rigid.distance(point.x);
+  // As of a plane normal to n: a convex body is nowhere nearer to the box than this.
+  const Approach of_plane{distance - point.reach(n), n, point.x - distance * n};
+  if (of_plane.gap > bending_range * grid.smallest_cell_size())
+    return of_plane;
+  dealii::Point<dim> corner = point.x;
+  for (unsigned int d = 0; d < dim; ++d)
+    if (std::abs(n[d]) > aligned)
+      corner[d] -= std::copysign(point.depth * point.half_extent[d], n[d]);
+  Approach found = at(corner);
+  if ((n - found.normal).norm() <= aligned)
+    return of_plane;
+  // Where the surface bends, what is nearest to it may lie before the corner of the box: there the normal has
+  // no part along the box.
+  dealii::Point<dim> between = corner;
+  for (unsigned int d = 0; d < dim; ++d)
+    if (n[d] * found.normal[d] < 0.)
+      between[d] = point.x[d] + (corner[d] - point.x[d]) * n[d] / (n[d] - found.normal[d]);
+  if (between != corner)
+    if (const Approach nearer = at(between); nearer.gap < found.gap)
+      found = nearer;
+  return found;
+}
+
+template <int dim>
+typename RigidSites<dim>::Approach RigidSites<dim>::at(const dealii::Point<dim> &x) const
+{
+  const double gap = rigid.distance(x);
+  const Vector n = rigid.normal(x);
+  return {gap, n, x - gap * n};
+}
+
+template <int dim>
 void RigidSites<dim>::find_gaps(const ActiveNodes<dim> &nodes,
                                 const std::function<bool(std::uint32_t)> &has_mass)
 {
   constexpr double far = ContactSite<dim>::far;
   const auto &points = near.points();
-  normals.assign(points.size(), Vector());
-  distances.assign(points.size(), far);
+  approaches.assign(points.size(), Approach());
   for (std::size_t p = 0; p < points.size(); ++p)
-    if (points[p].depth > 0.) {
-      normals[p] = rigid.normal(points[p].x);
-      distances[p] = rigid.distance(points[p].x);
-    }
+    if (points[p].depth > 0.)
+      approaches[p] = approach(points[p]);
 
   const std::size_t size = parallel ? nodes.size() : sites.size();
   nearest.assign(size, -far);
   for (const auto &entry : near.entries())
-    if (distances[entry.point] < far) {
-      const double gap = distances[entry.point] - points[entry.point].reach(normals[entry.point]);
+    if (approaches[entry.point].gap < far) {
       double &value = nearest[index_of(sites[entry.site])];
-      value = std::max(value, -gap);
+      value = std::max(value, -approaches[entry.point].gap);
     }
   if (parallel)
     nodes.max_over_ranks(nearest.data(), 1);
 
-  // Normal, place, and volume gradient.
+  // Means over the points near the surface, and over those that touch it: weights, gaps, normals and places;
+  // and the volume gradient.
   sums.assign(size * n_columns, 0.);
-  const double range = ContactSite<dim>::surface_range * grid.smallest_cell_size();
+  const double h = grid.smallest_cell_size();
+  const double range = ContactSite<dim>::surface_range * h, slack = ContactSite<dim>::gap_slack * h;
   for (const auto &entry : near.entries()) {
     double *sum = values_of(sites[entry.site]);
     const auto &point = points[entry.point];
     for (unsigned int d = 0; d < dim; ++d)
-      sum[1 + 2 * dim + d] += point.volume * entry.dN[d];
-    if (distances[entry.point] == far)
+      sum[gradient_column + d] += point.volume * entry.dN[d];
+    const Approach &found = approaches[entry.point];
+    if (found.gap == far)
       continue;
-    const Vector &n = normals[entry.point];
-    const double gap = distances[entry.point] - point.reach(n);
-    const double w = entry.N * std::max(0., 1. - (gap + nearest[index_of(sites[entry.site])]) / range);
+    const double above = found.gap + nearest[index_of(sites[entry.site])];
+    const double w = entry.N * std::max(0., 1. - above / range);
     sum[0] += w;
+    sum[1] += w * found.gap;
+    const double w_touch = entry.N * std::max(0., 1. - above / (touch_range * h));
+    sum[touch_column] += w_touch;
     for (unsigned int d = 0; d < dim; ++d) {
-      sum[1 + d] += w * n[d];
-      sum[1 + dim + d] += w * (point.x[d] - distances[entry.point] * n[d]);
+      sum[2 + d] += w * found.normal[d];
+      sum[2 + dim + d] += w * found.place[d];
+      sum[touch_column + 1 + d] += w_touch * found.normal[d];
+      sum[touch_column + 1 + dim + d] += w_touch * found.place[d];
     }
-    sum[1 + 3 * dim] += w * gap;
   }
   if (parallel)
     nodes.sum_over_ranks(sums.data(), n_columns);
@@ -128,17 +174,21 @@ void RigidSites<dim>::find_gaps(const ActiveNodes<dim> &nodes,
     site.normal = Vector();
     if (!(sum[0] > 0.) || !has_mass(site.second))
       continue;
-    for (unsigned int d = 0; d < dim; ++d) {
-      site.normal[d] = sum[1 + d];
-      site.x[d] = sum[1 + dim + d] / sum[0];
-    }
-    if (site.normal.norm() == 0.)
-      continue;
-    site.normal /= site.normal.norm();
     // The least gap of all points that reach the node would be that of a surface which is in contact beside
     // it: a wheel would be held by the ground ahead of it. Within the slack it counts, as of flat surfaces.
-    const double least = -nearest[index_of(site)], mean = sum[1 + 3 * dim] / sum[0];
-    site.gap = least + std::max(0., mean - least - ContactSite<dim>::gap_slack * grid.smallest_cell_size());
+    const double least = -nearest[index_of(site)], mean = sum[1] / sum[0];
+    site.gap = least + std::max(0., mean - least - slack);
+    // Forces act where and along what changes this gap when the rigid body moves (43c); else a wheel would
+    // climb the ground ahead of it, and hop.
+    const bool least_counts = mean - least <= slack;
+    const double weight = least_counts ? sum[touch_column] : sum[0];
+    const double *means = least_counts ? sum + touch_column + 1 : sum + 2;
+    for (unsigned int d = 0; d < dim; ++d) {
+      site.normal[d] = means[d];
+      site.x[d] = means[dim + d] / weight;
+    }
+    if (site.normal.norm() > 0.)
+      site.normal /= site.normal.norm();
   }
 }
 
@@ -150,7 +200,7 @@ void RigidSites<dim>::find_surfaces(const ActiveNodes<dim> &nodes)
     // sum V grad N points out of the body.
     Vector gradient;
     for (unsigned int d = 0; d < dim; ++d)
-      gradient[d] = values_of(sites[s])[1 + 2 * dim + d];
+      gradient[d] = values_of(sites[s])[gradient_column + d];
     areas[s] = -(gradient * sites[s].normal);
   }
   lines.find(nodes, &ContactSite<dim>::second, site_of_node, areas, sites);

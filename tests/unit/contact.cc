@@ -6,6 +6,7 @@
 
 #include <peat/contact/contact_law.h>
 #include <peat/contact/separating_plane.h>
+#include <peat/solver/rigid_sites.h>
 
 BOOST_TEST_GLOBAL_FIXTURE(Mpi);
 
@@ -94,6 +95,46 @@ struct Meeting
   std::vector<dealii::Point<dim>> places;
   SeparatingPlanes<dim> planes;
 };
+
+/// A rigid body on ground in a mesh of cells of size 1/8, and where they may touch.
+struct RigidAbove
+{
+  RigidAbove(const std::string &ground, const std::string &shape)
+  {
+    write_file("rigid.prm",
+               "set Dimension = 2\nsubsection Grid\n set Lower corner = 0, 0\n set Upper corner = 2, 2\n"
+               " set Cells = 16, 16\nend\nsubsection Materials\n subsection m\n set Density = 1000\n "
+               "end\nend\nsubsection Bodies\n subsection ground\n set Material = m\n set Shape = " +
+                   ground + "\n end\nend\nsubsection Rigid bodies\n subsection tool\n set Shape = " + shape +
+                   "\n set Motion = prescribed\n end\nend\nsubsection Contacts\n subsection c\n set "
+                   "Bodies = tool, ground\n set Law = frictionless\n end\nend\nsubsection Stages\n "
+                   "subsection s\n set Duration = 1\n end\nend\n");
+    file = std::make_unique<ParameterFile>("rigid.prm", std::vector<std::string>());
+    read_dimension(*file);
+    parameters = std::make_unique<Case<2>>(*file);
+    grid = std::make_unique<Grid<2>>(parameters->grid, comm);
+    scene = make_scene(*parameters, *grid);
+    nodes = std::make_unique<ActiveNodes<2>>(*grid, 4);
+    std::vector<CellId> cells;
+    for (const Slice &slice : scene.bodies.front()->slices())
+      cells.push_back(slice.cell);
+    nodes->rebuild(cells);
+    surface =
+        std::make_unique<RigidSites<2>>(*grid, Basis::gimp, *scene.rigid_bodies.front(),
+                                        std::vector<const Body<2> *>{scene.bodies.front().get()}, sites);
+    surface->choose(*nodes);
+    surface->find(*nodes, [](std::uint32_t) { return true; });
+  }
+
+  Directory directory;
+  std::unique_ptr<ParameterFile> file;
+  std::unique_ptr<Case<2>> parameters;
+  std::unique_ptr<Grid<2>> grid;
+  Scene<2> scene;
+  std::unique_ptr<ActiveNodes<2>> nodes;
+  std::vector<ContactSite<2>> sites;
+  std::unique_ptr<RigidSites<2>> surface;
+};
 } // namespace
 
 BOOST_AUTO_TEST_CASE(laws)
@@ -157,4 +198,41 @@ BOOST_AUTO_TEST_CASE(flat_faces_in_space)
       BOOST_TEST(meeting.planes.normal(site)[2] > std::cos(2. * 3.1416 / 180.));
       BOOST_TEST(std::abs(meeting.gap(site, dealii::Point<3>(0., 0., 1.)) - 0.01) < 1e-12);
     }
+}
+
+BOOST_AUTO_TEST_CASE(corners_of_rigid_bodies)
+{
+  // In a pit that fits it: it touches the bottom and the sides, and no point beside its edge overlaps it.
+  for (const std::string bottom : {"0.95", "0.91"}) {
+    const RigidAbove meeting("difference(box(0, 0, 2, 1), box(0.625, " + bottom + ", 1.25, 2))",
+                             "box(0.625, " + bottom + ", 1.25, 1.9)");
+    unsigned int n_below = 0;
+    for (const auto &site : meeting.sites)
+      if (site.acts) {
+        const auto &x = meeting.nodes->position(site.second);
+        BOOST_TEST(std::abs(site.gap) < 1e-9, "gap " << site.gap << " at " << x);
+        if (x[0] < 0.7 || x[0] > 1.2)
+          continue;
+        ++n_below;
+        BOOST_TEST(site.normal[1] < -1. + 1e-9, "normal " << site.normal << " at " << x);
+      }
+    BOOST_TEST(n_below == 4u);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(place_under_a_wheel)
+{
+  // Between two nodes: both bear it where it touches, with the normal there.
+  const double axis = 1.04, gap = 0.001, h = 0.125;
+  const RigidAbove meeting("box(0, 0, 2, 1)", "disc(1.04, 3.001, 2)");
+  unsigned int n_sites = 0;
+  for (const auto &site : meeting.sites)
+    if (site.acts && site.gap < gap + 1e-5) {
+      ++n_sites;
+      BOOST_TEST(site.gap > gap - 1e-9);
+      BOOST_TEST(std::abs(site.x[0] - axis) < 0.3 * h, "place " << site.x);
+      // It pushes through its axis.
+      BOOST_TEST(std::abs(site.normal[0] - (site.x[0] - axis) / 2.) < 1e-4, "normal " << site.normal);
+    }
+  BOOST_TEST(n_sites == 2u);
 }

@@ -31,7 +31,18 @@ private:
   using Vector = dealii::Tensor<1, dim>;
   using Corners = std::array<dealii::Point<dim>, (1u << dim)>;
 
+  /// Where a point's box comes nearest to the rigid body.
+  struct Approach
+  {
+    double gap = ContactSite<dim>::far; ///< [m]
+    Vector normal;                      ///< of the rigid body, there
+    dealii::Point<dim> place;           ///< on its surface
+  };
+
   Corners corners() const;
+  Approach approach(const typename NearPoints<dim>::PointData &point) const;
+  /// Of a point alone.
+  Approach at(const dealii::Point<dim> &x) const;
   void find_gaps(const ActiveNodes<dim> &nodes, const std::function<bool(std::uint32_t)> &has_mass);
   void find_surfaces(const ActiveNodes<dim> &nodes);
   double *values_of(const ContactSite<dim> &site) { return &sums[std::size_t(index_of(site)) * n_columns]; }
@@ -55,11 +66,11 @@ private:
   Corners corners_of_choice;
 
   // Of a step, here to keep their memory.
-  std::vector<Vector> normals; ///< of the rigid body at the points near it
-  std::vector<double> distances;
-  std::vector<double> areas; ///< of the interface, by site
+  std::vector<Approach> approaches; ///< of the points near the rigid body
+  std::vector<double> areas;        ///< of the interface, by site
   /// By index_of(): least distance of the bodies' points, negative; sums over them (see find_gaps()).
   std::vector<double> nearest, sums;
-  static constexpr unsigned int n_columns = 2 + 3 * dim;
+  static constexpr unsigned int touch_column = 2 + 2 * dim, gradient_column = 3 + 4 * dim;
+  static constexpr unsigned int n_columns = 3 + 5 * dim;
 };
 } // namespace peat
