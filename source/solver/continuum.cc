@@ -32,6 +32,8 @@ Continuum<dim>::Continuum(const SchemeParameters &scheme, const Grid<dim> &grid,
       has_loads = has_loads || condition->has_body_force();
     }
   has_loads = has_loads || !surfaces.empty();
+  if (scheme.basis == Basis::q1)
+    extension = std::make_unique<NodeExtension<dim>>();
   if (scheme.implicit_pressure && saturated)
     make_implicit_pressure();
 }
@@ -53,7 +55,7 @@ void Continuum<dim>::make_implicit_pressure()
         constrains_flux || condition->fluid() == Fluid::flux || condition->fluid() == Fluid::impermeable;
   }
   pressure = std::make_unique<ImplicitPressure<dim>>(active, tried, alpha, scheme.seepage_inertia,
-                                                     scheme.pressure_stabilisation);
+                                                     scheme.pressure_stabilisation, extension.get());
   first_increment.resize(members.size());
 }
 
@@ -79,7 +81,16 @@ std::vector<CellId> Continuum<dim>::occupied_cells() const
 template <int dim>
 void Continuum<dim>::number_nodes(const std::vector<NodeId> &more_nodes)
 {
-  active.rebuild(occupied_cells(), more_nodes);
+  const std::vector<CellId> occupied = occupied_cells();
+  if (extension && dealii::Utilities::MPI::n_mpi_processes(grid.communicator()) > 1) {
+    // A node behind a small one may be reached by points of another rank only.
+    ActiveNodes<dim> reached(grid, active.nodes_per_direction());
+    reached.rebuild(occupied, more_nodes);
+    auto nodes = with_neighbours(grid, reached.exchanged_nodes());
+    nodes.insert(nodes.end(), more_nodes.begin(), more_nodes.end());
+    active.rebuild(occupied, nodes);
+  } else
+    active.rebuild(occupied, more_nodes);
   resize_fields();
   steps_to_small_nodes = 0;
 
@@ -95,6 +106,10 @@ void Continuum<dim>::number_nodes(const std::vector<NodeId> &more_nodes)
       if (!open[b])
         for (const std::uint32_t i : active.on_boundary(b))
           closed_rows.push_back(std::size_t(i) * dim + b / 2);
+  if (extension) {
+    find_prescribed_rows();
+    extension->reinit(active, prescribed);
+  }
   if (!pressure)
     return;
   std::vector<CellId> cells;
@@ -238,6 +253,30 @@ void Continuum<dim>::points_to_nodes(const double time, const double dt)
     kernels[b]->scatter(body(b), active, pressure_update(b), nodal.sums.data(), nodal.n_sums, sums);
   }
   active.sum_over_ranks(nodal.sums.data(), nodal.n_sums);
+  if (extension)
+    extend_nodes();
+}
+
+template <int dim>
+void Continuum<dim>::extend_nodes()
+{
+  using S = Sums<dim>;
+  double *sums = nodal.sums.data();
+  extension->find(sums, nodal.n_sums, saturated ? int(S::resistance) : -1);
+  extension->fold_momentum(sums, nodal.n_sums, S::momentum);
+  extension->fold(sums, nodal.n_sums, S::mass, 1);
+  extension->fold(sums, nodal.n_sums, S::force, nodal.n_sums - S::force);
+}
+
+template <int dim>
+const std::vector<double> &Continuum<dim>::seen_by_points(const std::vector<double> &field,
+                                                          std::vector<double> &seen) const
+{
+  if (!extension || field.empty())
+    return field;
+  seen = field;
+  extension->unfold(seen.data(), dim);
+  return seen;
 }
 
 template <int dim>
@@ -276,6 +315,10 @@ void Continuum<dim>::add_loads()
     active.sum_over_ranks(nodal.force.data(), dim);
   if (saturated)
     active.sum_over_ranks(nodal.pressure_load.data(), dim);
+  if (extension && has_loads)
+    extension->fold(nodal.force.data(), dim, 0, dim);
+  if (extension && saturated)
+    extension->fold(nodal.pressure_load.data(), dim, 0, dim);
 
   const double origin[3] = {0., 0., 0.};
   for (unsigned int d = 0; d < dim; ++d)
@@ -469,10 +512,13 @@ void Continuum<dim>::advance_points()
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
   const char *spin_only = scheme.affine ? near_small_node.data() : nullptr;
   std::fill(mapped_velocity.begin(), mapped_velocity.end(), 0.);
+  const double *a = seen_by_points(nodal.acceleration, seen_acceleration).data();
+  const double *v = seen_by_points(nodal.new_velocity, seen_velocity).data();
   for (std::size_t b = 0; b < members.size(); ++b)
-    kernels[b]->advance_and_remap(body(b), active, nodal.acceleration.data(), nodal.new_velocity.data(),
-                                  spin_only, update, mapped_velocity.data());
+    kernels[b]->advance_and_remap(body(b), active, a, v, spin_only, update, mapped_velocity.data());
   active.sum_over_ranks(mapped_velocity.data(), dim);
+  if (extension)
+    extension->fold_momentum(mapped_velocity.data(), dim, 0);
   for (std::size_t i = 0; i < active.size(); ++i) {
     const double m = mass(i);
     for (unsigned int d = 0; d < dim; ++d)
@@ -487,18 +533,18 @@ void Continuum<dim>::deform_points()
 {
   step_findings = {};
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
-  const double *w = nodal.flux.data();
+  const double *w = seen_by_points(nodal.flux, seen_flux).data();
+  const double *v = seen_by_points(carrying_velocity(), seen_velocity).data();
+  const double *a = remapped ? nullptr : seen_by_points(nodal.acceleration, seen_acceleration).data();
   const char *spin_only = scheme.affine ? near_small_node.data() : nullptr;
   for (std::size_t b = 0; b < members.size(); ++b) {
     PressureUpdate pressures = pressure_update(b);
     if (pressure && body(b).material().mixture())
       pressures.increments = pressure->increments() + first_increment[b];
     if (remapped)
-      kernels[b]->deform(body(b), active, mapped_velocity.data(), w, spin_only, nodal.dt, pressures,
-                         step_findings);
+      kernels[b]->deform(body(b), active, v, w, spin_only, nodal.dt, pressures, step_findings);
     else
-      kernels[b]->advance_and_deform(body(b), active, nodal.acceleration.data(), nodal.new_velocity.data(), w,
-                                     spin_only, update, pressures, step_findings);
+      kernels[b]->advance_and_deform(body(b), active, a, v, w, spin_only, update, pressures, step_findings);
   }
 }
 
@@ -537,7 +583,9 @@ void Continuum<dim>::book_balances(Ledger<dim> &book) const
 template <int dim>
 void Continuum<dim>::move_tracers()
 {
-  const std::vector<double> &velocity = carrying_velocity();
+  const std::vector<double> &velocity = extension ? seen_velocity : carrying_velocity();
+  if (extension && saturated)
+    nodal.flux = seen_flux; // for pictures
   for (const std::string &name : surfaces)
     scene.surfaces.at(name).move(velocity, nodal.dt, scene.body(name).material().law().finite_strain(),
                                  active);

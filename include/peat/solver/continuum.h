@@ -3,6 +3,7 @@
 #include <peat/condition/nodal_fields.h>
 #include <peat/solver/implicit_pressure.h>
 #include <peat/solver/ledger.h>
+#include <peat/solver/node_extension.h>
 #include <peat/solver/scene.h>
 #include <peat/solver/scheme.h>
 #include <peat/transfer/kernels.h>
@@ -58,6 +59,8 @@ public:
   /// What a change of pressures that is tried does to the nodes; empty where it concerns these alone.
   NodalResponse &response() { return tried; }
   const NodalResponse &response() const { return tried; }
+  /// Nullptr with shape functions that have no small nodes of large effect.
+  const NodeExtension<dim> *node_extension() const { return extension.get(); }
   /// From now on other things are coupled with the nodes.
   void couple_nodes();
 
@@ -75,6 +78,9 @@ public:
 private:
   void resize_fields();
   void renumber_flux();
+  void extend_nodes();
+  /// The field as points see it; a copy in `seen` where that differs from what the nodes have.
+  const std::vector<double> &seen_by_points(const std::vector<double> &field, std::vector<double> &seen) const;
   void find_small_nodes();
   /// Half of the cells of the mesh on either side, in every direction [m^dim].
   double node_volume(std::size_t node) const;
@@ -105,6 +111,9 @@ private:
   std::vector<double> filter_rates; ///< of the pressure filter, by member [1/s]
   NodalFields<dim> nodal;
   std::vector<double> mapped_velocity;
+  std::unique_ptr<NodeExtension<dim>> extension;
+  /// What points see of the nodes' motion where there is an extension.
+  std::vector<double> seen_acceleration, seen_velocity, seen_flux;
   /// Cells that have a node of little mass, by ActiveNodes::occupied_index().
   std::vector<char> near_small_node;
   unsigned int steps_to_small_nodes = 0;
