@@ -23,6 +23,10 @@ Continuum<dim>::Continuum(const SchemeParameters &scheme, const Grid<dim> &grid,
                                : 0.);
   }
   nodal.n_sums = Sums<dim>::n_columns(saturated);
+  for (const std::size_t b : members)
+    if (const Material &material = scene.bodies[b]->material(); material.mixture())
+      wave_time = std::max(wave_time, grid.smallest_cell_size() /
+                                          material.mixture()->undrained_speed(material.initial_modulus()));
   for (const auto &[name, tracers] : scene.surfaces)
     if (holds_body(name))
       surfaces.push_back(name);
@@ -163,28 +167,39 @@ void Continuum<dim>::resize_fields()
   if (has_loads)
     nodal.force.assign(n * dim, 0.);
   if (saturated) {
-    renumber_flux();
+    // Steps find the flux anew; this is for pictures between the steps.
+    renumber(nodal.flux);
+    renumber(contact_acceleration);
     nodal.pressure_load.assign(n * dim, 0.);
   }
 }
 
 template <int dim>
-void Continuum<dim>::renumber_flux()
+void Continuum<dim>::renumber(std::vector<double> &field) const
 {
-  // Steps find the flux anew; this is for pictures between the steps. Another rank may know a node that is
-  // new here: its value comes with a count.
+  // Another rank may know a node that is new here: its value comes with a count.
   constexpr unsigned int n = dim + 1;
   std::vector<double> known(active.size() * n, 0.);
   for (std::size_t i = 0; i < active.size(); ++i)
-    if (const std::uint32_t old = active.previous_index(i); old != no_index && !nodal.flux.empty()) {
-      std::copy_n(&nodal.flux[std::size_t(old) * dim], dim, &known[i * n]);
+    if (const std::uint32_t old = active.previous_index(i); old != no_index && !field.empty()) {
+      std::copy_n(&field[std::size_t(old) * dim], dim, &known[i * n]);
       known[i * n + dim] = 1.;
     }
   active.sum_over_ranks(known.data(), n);
-  nodal.flux.assign(active.size() * dim, 0.);
+  field.assign(active.size() * dim, 0.);
   for (std::size_t i = 0; i < active.size(); ++i)
     for (unsigned int d = 0; d < dim; ++d)
-      nodal.flux[i * dim + d] = known[i * n + d] / std::max(1., known[i * n + dim]);
+      field[i * dim + d] = known[i * n + d] / std::max(1., known[i * n + dim]);
+}
+
+template <int dim>
+double Continuum<dim>::contact_share() const
+{
+  // Steps that follow waves are a fifth of this time at least, those that follow the diffusion of pressure
+  // may be a hundredth: impulses of single ones say nothing of the motion, and the sum of their squares has
+  // no limit.
+  constexpr double part_of_wave_time = 0.2;
+  return std::min(1., nodal.dt / (part_of_wave_time * wave_time));
 }
 
 template <int dim>
@@ -391,14 +406,17 @@ void Continuum<dim>::solve_darcy()
     return;
   using S = Sums<dim>;
   const double inertia = scheme.seepage_inertia ? 1. : 0.;
+  const double late = nodal.contact_force.empty() ? 0. : 1. - contact_share();
   for (std::size_t i = 0; i < active.size(); ++i) {
     const double *sum = &nodal.sums[i * nodal.n_sums];
     const double inverse = sum[S::resistance] > 0. ? 1. / sum[S::resistance] : 0.;
     for (unsigned int d = 0; d < dim; ++d) {
       const std::size_t row = i * dim + d;
-      nodal.flux[row] =
-          inverse * (sum[S::pressure_force + d] + nodal.pressure_load[row] +
-                     sum[S::fluid_inertia] * (gravity_now[d] - inertia * nodal.acceleration[row]));
+      double a = nodal.acceleration[row];
+      if (late > 0. && nodal.contact_force[row] != 0.)
+        a -= late * (a - contact_acceleration[row]);
+      nodal.flux[row] = inverse * (sum[S::pressure_force + d] + nodal.pressure_load[row] +
+                                   sum[S::fluid_inertia] * (gravity_now[d] - inertia * a));
     }
   }
   for (const std::size_t row : closed_rows)
@@ -507,6 +525,14 @@ void Continuum<dim>::advance_points()
   // but the gradient of its velocity would feel them in full, and bring them back to the node.
   if (scheme.affine)
     find_small_nodes();
+  if (saturated && !nodal.contact_force.empty()) {
+    const double share = contact_share();
+    for (std::size_t row = 0; row < contact_acceleration.size(); ++row) {
+      const double now = nodal.acceleration[row];
+      contact_acceleration[row] +=
+          (nodal.contact_force[row] != 0. ? share : 1.) * (now - contact_acceleration[row]);
+    }
+  }
   if (!remapped)
     return;
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};

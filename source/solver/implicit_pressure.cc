@@ -34,8 +34,7 @@ inline void split_by_alternation(double *value)
 template <int dim>
 ImplicitPressure<dim>::ImplicitPressure(const ActiveNodes<dim> &active, NodalResponse &response,
                                         const double alpha, const bool seepage_inertia,
-                                        const double stabilisation,
-                                        const NodeExtension<dim> *const extension)
+                                        const double stabilisation, const NodeExtension<dim> *const extension)
     : active(active), response(response), alpha(alpha), seepage_inertia(seepage_inertia),
       stabilisation(stabilisation), extension(extension), communicator(active.grid().communicator())
 {}

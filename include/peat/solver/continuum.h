@@ -77,7 +77,9 @@ public:
 
 private:
   void resize_fields();
-  void renumber_flux();
+  /// Of a field with dim columns keep what nodes had that are still there.
+  void renumber(std::vector<double> &field) const;
+  double contact_share() const;
   void extend_nodes();
   /// The field as points see it; a copy in `seen` where that differs from what the nodes have.
   const std::vector<double> &seen_by_points(const std::vector<double> &field, std::vector<double> &seen) const;
@@ -114,6 +116,9 @@ private:
   std::unique_ptr<NodeExtension<dim>> extension;
   /// What points see of the nodes' motion where there is an extension.
   std::vector<double> seen_acceleration, seen_velocity, seen_flux;
+  /// By contact, in the mean over steps that follow no wave across a cell [m/s^2].
+  std::vector<double> contact_acceleration;
+  double wave_time = 0.; ///< of an undrained wave across the smallest cell [s]
   /// Cells that have a node of little mass, by ActiveNodes::occupied_index().
   std::vector<char> near_small_node;
   unsigned int steps_to_small_nodes = 0;

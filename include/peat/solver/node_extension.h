@@ -8,33 +8,37 @@
 namespace peat {
 /// What moves in the place of nodes that hold next to no material, with linear shape functions.
 ///
-/// A point that has just passed a face of cells has a finite gradient of the shape function of the node beyond, and next
-/// to none of its value: that node's acceleration and flux have no bound, and no step is short enough for them. So the
-/// less material such a node a has, the less of its own motion counts, and the more that of the straight line through the
-/// two nodes behind it, b and c (theory.md, equation 27a):
+/// A point that has just passed a face of cells has a finite gradient of the shape function of the node
+/// beyond, and next to none of its value: that node's acceleration and flux have no bound, and no step is
+/// short enough for them. So the less material such a node a has, the less of its own motion counts, and the
+/// more that of the straight line through the two nodes behind it, b and c (theory.md, equation 27a):
 ///
 ///   v_a <- s v_a + (1 - s) ((1 + e) v_b - e v_c),   s = m_a / (0.1 m_b) < 1
 ///
-/// This is a change of shape functions: N_a becomes s N_a, and b and c get the rest. What points bring to nodes follows the
-/// transposed rule. Their sum is still one, what is linear in place stays so, power and momentum are kept.
+/// This is a change of shape functions: N_a becomes s N_a, and b and c get the rest. What points bring to
+/// nodes follows the transposed rule. Their sum is still one, what is linear in place stays so, power and
+/// momentum are kept.
 ///
-/// What a, b, c are is looked for in each step, since it follows the points' motion without a jump. Nodes behind may be
-/// small themselves (at corners); so there are levels, at most one for each direction. All functions are collective.
+/// What a, b, c are is looked for in each step, since it follows the points' motion without a jump. Nodes
+/// behind may be small themselves (at corners); so there are levels, at most one for each direction. All
+/// functions are collective.
 template <int dim>
 class NodeExtension
 {
 public:
   /// The nodes have new numbers.
-  /// @param given by node and component, dim columns: the motion is prescribed there. A node on a wall follows nodes on
+  /// @param given by node and component, dim columns: the motion is prescribed there. A node on a wall
+  /// follows nodes on
   ///        that wall only; which its flux need not, since what is so far from a wall is not closed by it.
   void reinit(const ActiveNodes<dim> &nodes, const std::vector<char> &given);
   /// Find small nodes and those behind them.
-  /// @param sums rows with `stride` columns, the first of which is the mass; column `resistance` that of the flux, if >= 0.
+  /// @param sums rows with `stride` columns, the first of which is the mass; column `resistance` that of the
+  /// flux, if >= 0.
   ///        As the points bring them.
   void find(const double *sums, unsigned int stride, int resistance);
 
-  /// Of the points' contributions to nodes make those to what moves: rows with `stride` columns, of which n from `first`
-  /// on. A linear form of the nodes' motion: forces, masses, areas.
+  /// Of the points' contributions to nodes make those to what moves: rows with `stride` columns, of which n
+  /// from `first` on. A linear form of the nodes' motion: forces, masses, areas.
   void fold(double *data, unsigned int stride, unsigned int first, unsigned int n) const;
   /// Momentum, dim columns from `first` on: velocities of b and c that are those of a linear field stay so.
   void fold_momentum(double *data, unsigned int stride, unsigned int first) const;
@@ -61,7 +65,8 @@ private:
     std::array<char, 2 * dim> mine; ///< this rank has the first cell on that way, and adds up for all
   };
 
-  /// Add to data what action(line, delta) finds from it, delta being for the three nodes, with n columns each.
+  /// Add to data what action(line, delta) finds from it, delta being for the three nodes, with n columns
+  /// each.
   template <typename Action>
   void at_level(unsigned int level, double *data, unsigned int stride, unsigned int first, unsigned int n,
                 const Action &action) const;
