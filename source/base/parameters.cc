@@ -90,11 +90,6 @@ std::vector<std::string> read_list(const Section &section, const std::string &ke
   return parts;
 }
 
-bool is_one_of(const std::vector<std::string> &choices, const std::string &word)
-{
-  return std::find(choices.begin(), choices.end(), word) != choices.end();
-}
-
 std::string read_choice(const Section &section, const std::string &key, const std::string &word,
                         const std::vector<std::string> &choices)
 {

@@ -12,11 +12,6 @@ namespace {
 using internal::Declared;
 using internal::SectionNode;
 
-bool is_one_of(const std::vector<std::string> &words, const std::string &word)
-{
-  return std::find(words.begin(), words.end(), word) != words.end();
-}
-
 // --- The parameter file
 
 /// A comment in lines of at most 100 characters.

@@ -78,6 +78,11 @@ std::string join(const std::vector<std::string> &words)
   return result;
 }
 
+bool is_one_of(const std::vector<std::string> &words, const std::string &word)
+{
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
 std::string to_text(const double number)
 {
   char buffer[64];

@@ -1,3 +1,4 @@
+#include <peat/base/text.h>
 #include <peat/condition/condition.h>
 
 #include <algorithm>
@@ -13,19 +14,6 @@ int boundary_id(const std::string &name)
       return b;
   return -1;
 }
-
-std::string quoted_list(const std::vector<std::string> &words)
-{
-  std::string text;
-  for (const auto &word : words)
-    text += (text.empty() ? "'" : ", '") + word + "'";
-  return text;
-}
-
-bool contains(const std::vector<std::string> &words, const std::string &word)
-{
-  return std::find(words.begin(), words.end(), word) != words.end();
-}
 } // namespace
 
 template <int dim>
@@ -34,7 +22,7 @@ Place<dim>::Place(Section section, const std::vector<std::string> &body_names)
   std::vector<std::string> where;
   std::string region_text;
   section.add("Where", where,
-              "Faces of the mesh (" + quoted_list(boundary_names<dim>()) +
+              "Faces of the mesh (" + in_quotes(boundary_names<dim>()) +
                   "), 'surface of BODY', one side of a body ('top of BODY'), or 'region'.");
   section.add("Region", region_text,
               "A shape: only nodes (or parts of the surface, as they were at the start) inside "
@@ -59,9 +47,9 @@ Place<dim>::Place(Section section, const std::vector<std::string> &body_names)
       direction = boundary_id<dim>(side);
       if (direction < 0 && side != "surface")
         section.fail("Where", "'" + side + "' is no side of a body; sides are 'surface', " +
-                                  quoted_list(boundary_names<dim>()));
-      if (!peat::contains(body_names, body))
-        section.fail("Where", "there is no body '" + body + "'; the bodies are " + quoted_list(body_names));
+                                  in_quotes(boundary_names<dim>()));
+      if (!is_one_of(body_names, body))
+        section.fail("Where", "there is no body '" + body + "'; the bodies are " + in_quotes(body_names));
     } else if (word == "region") {
       if (where.size() > 1)
         section.fail(
@@ -73,7 +61,7 @@ Place<dim>::Place(Section section, const std::vector<std::string> &body_names)
       const int id = boundary_id<dim>(word);
       if (id < 0)
         section.fail("Where", "there is no boundary '" + word + "'; the mesh has " +
-                                  quoted_list(boundary_names<dim>()) + ", bodies have 'surface of BODY'");
+                                  in_quotes(boundary_names<dim>()) + ", bodies have 'surface of BODY'");
       boundaries.push_back(id);
     }
   }

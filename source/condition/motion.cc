@@ -1,6 +1,6 @@
 #include <peat/condition/condition.h>
 
-#include <algorithm>
+#include "components.h"
 
 // Conditions on the motion. A node's prescribed component has the given velocity, and as acceleration the
 // rate of that velocity; what the points bring along is not pushed into them at once, they follow through the
@@ -69,20 +69,12 @@ public:
       : Condition<dim>(section, place), value(dim == 2 ? "0, 0" : "0, 0, 0", {}, {})
   {
     require_mesh(section, place);
-    const std::vector<std::string> axes =
-        dim == 2 ? std::vector<std::string>{"x", "y"} : std::vector<std::string>{"x", "y", "z"};
-    std::vector<std::string> components = axes;
+    std::vector<std::string> components = axis_names<dim>();
     section.add("Value", value, dim, unit, text);
-    section.add("Components", components, axes, "The components that are prescribed; the others stay free.");
+    section.add("Components", components, axis_names<dim>(),
+                "The components that are prescribed; the others stay free.");
     section.require_start("Value", value);
-    if (components.empty())
-      section.fail("Components", "name at least one component");
-    for (unsigned int d = 0; d < dim; ++d) {
-      const auto n = std::count(components.begin(), components.end(), axes[d]);
-      if (n > 1)
-        section.fail("Components", "'" + axes[d] + "' stands twice");
-      prescribed[d] = n == 1;
-    }
+    prescribed = named_components<dim>(section, components);
   }
   bool prescribes(unsigned int, const unsigned int component) const override { return prescribed[component]; }
 

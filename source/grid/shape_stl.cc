@@ -100,7 +100,7 @@ private:
   }
 };
 
-std::shared_ptr<const Shape<3>> make(const ShapeCall<3> &call)
+std::shared_ptr<const Shape<3>> make_solid(const ShapeCall<3> &call)
 {
   // Line 0: the command line, whose files are relative to the working directory.
   const std::filesystem::path file = call.arguments[0],
@@ -120,6 +120,6 @@ std::shared_ptr<const Shape<3>> make(const ShapeCall<3> &call)
 const ShapeMember<3> stl("stl", "file",
                          "What the closed surface of triangles in an STL file encloses; the file's place is "
                          "relative to the parameter file.",
-                         make);
+                         make_solid);
 } // namespace
 } // namespace peat

@@ -172,7 +172,7 @@ private:
   const std::array<LogarithmRule, 5> rules;
 };
 
-const Member<Law, Hencky> member("hencky",
+const Member<Law, Hencky> hencky("hencky",
                                  "Hencky elasticity for finite strains: linear between Kirchhoff stress and "
                                  "logarithmic strain.");
 } // namespace

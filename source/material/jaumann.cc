@@ -80,8 +80,8 @@ private:
   const ElasticModuli moduli;
 };
 
-const Member<Law, Jaumann> member("jaumann",
-                                  "Hypoelasticity for finite strains with the Jaumann rate of the Cauchy "
-                                  "stress.");
+const Member<Law, Jaumann> jaumann("jaumann",
+                                   "Hypoelasticity for finite strains with the Jaumann rate of the Cauchy "
+                                   "stress.");
 } // namespace
 } // namespace peat

@@ -38,7 +38,8 @@ private:
   const ElasticModuli moduli;
 };
 
-const Member<Law, LinearElastic> member("linear elastic", "Isotropic linear elasticity for small strains and "
-                                                          "rotations; volumes are those at the start.");
+const Member<Law, LinearElastic> linear_elastic("linear elastic",
+                                                "Isotropic linear elasticity for small strains and "
+                                                "rotations; volumes are those at the start.");
 } // namespace
 } // namespace peat

@@ -66,7 +66,7 @@ private:
   const ElasticModuli moduli;
 };
 
-const Member<Law, NeoHookean> member("neo-hookean",
-                                     "Compressible neo-Hookean elasticity for finite strains.");
+const Member<Law, NeoHookean> neo_hookean("neo-hookean",
+                                          "Compressible neo-Hookean elasticity for finite strains.");
 } // namespace
 } // namespace peat

@@ -395,6 +395,12 @@ void Case<dim>::check(const Section &root) const
           !material(body.material).mixture())
         condition->section.fail("Where", "condition '" + condition->name +
                                              "' is about pore fluid, but body '" + body.name + "' is dry");
+  for (const auto &condition : conditions)
+    for (unsigned int d = 0; d < dim; ++d)
+      if (condition->ties(d) && !contacts.empty())
+        condition->section.fail("Kind", "condition '" + condition->name +
+                                            "' ties nodes, which does not go with 'Contacts'; a rigid body "
+                                            "with one of its 'Free components' is a plate, too");
   constexpr double most_lines = 1e7;
   const Section section = root.subsection("Output");
   for (const auto &[key, interval] : {std::make_pair("Interval", output.interval),

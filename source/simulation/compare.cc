@@ -1,6 +1,7 @@
 #include "compare_output.h"
 #include "html_report.h"
 
+#include <peat/base/nan.h>
 #include <peat/base/text.h>
 #include <peat/simulation/commands.h>
 #include <peat/simulation/simulation.h>
@@ -14,13 +15,10 @@
 #include <fstream>
 #include <iomanip>
 #include <iostream>
-#include <limits>
 #include <sstream>
 
 namespace peat {
 namespace {
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
 /// What the two runs of a case set, split at ';'.
 std::vector<std::string> split_settings(const std::string &text)
 {

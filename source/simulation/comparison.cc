@@ -1,5 +1,6 @@
 #include <peat/simulation/comparison.h>
 
+#include <peat/base/nan.h>
 #include <peat/base/text.h>
 
 #include <deal.II/base/mpi.h>
@@ -7,11 +8,9 @@
 #include <cmath>
 #include <filesystem>
 #include <iomanip>
-#include <limits>
 
 namespace peat {
 namespace {
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 /// How far beyond its ends a table counts, as a share of its length.
 constexpr double table_tolerance = 1e-6;
 

@@ -1,18 +1,16 @@
 #include <peat/simulation/difference.h>
 
+#include <peat/base/nan.h>
 #include <peat/simulation/table.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 
 namespace peat {
 namespace {
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
 /// Field numbers of a quantity's components, and how often each counts in the square of its magnitude.
-struct Quantity
+struct ComparedQuantity
 {
   std::vector<std::size_t> components;
   std::vector<double> multiplicity;
@@ -25,9 +23,9 @@ bool is_shear(const std::string &field)
 }
 
 /// Of the field, among `fields`; `prefix` is what names have in common before the field ("PROBE/").
-Quantity components_of(const std::string &field, const std::vector<std::string> &fields)
+ComparedQuantity components_of(const std::string &field, const std::vector<std::string> &fields)
 {
-  Quantity quantity;
+  ComparedQuantity quantity;
   for (std::size_t f = 0; f < fields.size(); ++f)
     if (quantity_of(fields[f]) == quantity_of(field)) {
       quantity.components.push_back(f);
@@ -48,8 +46,7 @@ std::vector<double> time_weights(const std::vector<double> &times, const bool fr
   return weights;
 }
 
-/// Sums of which a Difference is made.
-struct Sums
+struct DifferenceSums
 {
   double weight = 0., square = 0.;
   std::array<double, 2> quantity = {0., 0.}; ///< integrals of the squares of the magnitudes
@@ -182,8 +179,8 @@ std::string describe_place(const Recording &recording, const Pair &pair)
 Difference compare_field(const Recording &first, const std::vector<Pair> &pairs, const std::size_t field,
                          const double tolerance)
 {
-  const Quantity quantity = components_of(first.fields[field], first.fields);
-  Sums sums;
+  const ComparedQuantity quantity = components_of(first.fields[field], first.fields);
+  DifferenceSums sums;
   const Pair *worst = nullptr;
   for (const Pair &pair : pairs) {
     const std::array<double, 2> value = {pair.values[0][field], pair.values[1][field]};
@@ -287,8 +284,8 @@ std::vector<Difference> compare_histories(const Histories &first, const Historie
     const bool is_place = field.size() == 1;
     if (is_place || first.names != second.names)
       continue;
-    const Quantity quantity = components_of(fields[c], fields);
-    Sums sums;
+    const ComparedQuantity quantity = components_of(fields[c], fields);
+    DifferenceSums sums;
     std::vector<double> distances;
     for (std::size_t k = 0; k < first.time.size(); ++k) {
       std::array<double, 2> value, square = {0., 0.};

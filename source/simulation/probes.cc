@@ -1,5 +1,6 @@
 #include <peat/simulation/probes.h>
 
+#include <peat/base/nan.h>
 #include <peat/simulation/projection.h>
 #include <peat/simulation/table.h>
 
@@ -7,11 +8,9 @@
 
 #include <cmath>
 #include <iomanip>
-#include <limits>
 
 namespace peat {
 namespace {
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 /// A probe touches a cell that is so near [cell sizes].
 constexpr double touching = 1e-6;
 const std::vector<std::string> axis_names = {"x", "y", "z"};

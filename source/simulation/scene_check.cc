@@ -233,13 +233,49 @@ void check_pair(const Condition<dim> &a, const Condition<dim> &b, const Scene<di
     refuse("the surface of '" + a.place.body + "'", "pore fluid");
 }
 
+/// Faces of the mesh that a place names; -1: it is a region.
+template <int dim>
+std::vector<int> parts(const Place<dim> &place)
+{
+  return place.boundaries.empty() ? std::vector<int>{-1}
+                                  : std::vector<int>(place.boundaries.begin(), place.boundaries.end());
+}
+
+/// What is tied moves as one, and so nothing else may say how any node of it moves.
+template <int dim>
+void check_tie(const Condition<dim> &a, const Condition<dim> &b, const Grid<dim> &grid)
+{
+  if (!a.place.on_mesh() || !b.place.on_mesh())
+    return;
+  const auto refuse = [&](const int component) {
+    b.section.fail("Where", "conditions '" + a.name + "' and '" + b.name +
+                                "' meet at nodes, whose motion in " + std::string(1, "xyz"[component]) +
+                                " one ties and the other " +
+                                (a.ties(component) && b.ties(component) ? "ties, too" : "prescribes"));
+  };
+  for (const int first : parts(a.place))
+    for (const int second : parts(b.place))
+      for (int d = 0; d < dim; ++d) {
+        if (!((a.ties(d) && (b.ties(d) || b.prescribes(second, d))) || (b.ties(d) && a.prescribes(first, d))))
+          continue;
+        const auto in_both = [&](const typename Grid<dim>::Lattice &node, const double tolerance) {
+          return holds_node(a.place, node, grid, tolerance) && holds_node(b.place, node, grid, tolerance) &&
+                 (second < 0 || node[second / 2] == (second % 2 ? grid.n_cells(second / 2) : 0));
+        };
+        if (any_node(grid, first, bounds(a.place), in_both))
+          refuse(d);
+      }
+}
+
 template <int dim>
 void check_conditions(const Scene<dim> &scene, const Grid<dim> &grid)
 {
   for (std::size_t b = 0; b < scene.conditions.size(); ++b) {
     check_selection(*scene.conditions[b], scene, grid);
-    for (std::size_t a = 0; a < b; ++a)
+    for (std::size_t a = 0; a < b; ++a) {
       check_pair(*scene.conditions[a], *scene.conditions[b], scene, grid);
+      check_tie(*scene.conditions[a], *scene.conditions[b], grid);
+    }
   }
 }
 

@@ -18,6 +18,8 @@ constexpr double semi_implicit_cost = 2.;
 constexpr double implicit_cost_2d = 250., implicit_cost_3d = 1000.;
 // Steps for the period of a wave, for the rise of a load, and for what then fades away.
 constexpr double steps_per_period = 100., steps_per_change = 25., steps_of_decay = 30.;
+// Waves that no scheme keeps in phase any longer, and that implicit steps take out on the way.
+constexpr double most_periods = 1000.;
 
 /// A load, or a motion that is prescribed, as a function of time alone, and whether a value at the start is
 /// something that is switched on.
@@ -243,6 +245,14 @@ Demand demand(const Case<dim> &parameters, const StageParameters &stage, const S
     result.changes = std::max(result.changes, variation / range);
   }
   waves(!fast.empty(), fast);
+  if (const double periods = stage.duration / result.crossing; result.waves && periods > most_periods) {
+    std::ostringstream text;
+    text.precision(2);
+    text << "; the stage lasts " << periods
+         << " periods of the gravest one, more than any scheme keeps in phase: if they do not matter, "
+            "'Solver = quasi-static' does without";
+    result.why += text.str();
+  }
   result.changes = dealii::Utilities::MPI::max(result.changes, grid.communicator());
   return result;
 }
@@ -260,10 +270,12 @@ std::vector<SchemeEstimate> estimate_schemes(const Case<dim> &parameters, const 
     estimate.why_not = parameters.why_not(one, stage);
     if (estimate.why_not.empty() && one == Scheme::implicit) {
       const double fixed = parameters.implicit.fixed_step;
-      estimate.n_steps = fixed > 0.
-                             ? stage.duration / fixed
-                             : steps_of_decay + steps_per_change * asked.changes +
-                                   (asked.waves ? steps_per_period * stage.duration / asked.crossing : 0.);
+      estimate.n_steps =
+          fixed > 0.
+              ? stage.duration / fixed
+              : steps_of_decay + steps_per_change * asked.changes +
+                    (asked.waves ? steps_per_period * std::min(stage.duration / asked.crossing, most_periods)
+                                 : 0.);
       estimate.limit = fixed > 0. ? "'Time step'" : asked.waves ? "waves" : "changes of the loads";
       estimate.dt = stage.duration / estimate.n_steps;
       estimate.cost = estimate.n_steps * (dim == 2 ? implicit_cost_2d : implicit_cost_3d);

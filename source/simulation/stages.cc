@@ -188,6 +188,7 @@ void Simulation<dim>::run_implicit_stage(const StageParameters &stage, const dou
                  start);
   up_solver->start(stage.solver == StageParameters::Solver::quasi_static ? Mode::quasi_static
                                                                          : Mode::dynamic);
+  balances->count_inertia(stage.solver != StageParameters::Solver::quasi_static, totals(scene, communicator));
   begin_stage(stage, up_solver->suggested_step());
   ContactEvents<dim> events(log, communicator);
   double clock = seconds();
@@ -303,6 +304,7 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
   ExplicitMPM<dim> &mpm = *made;
   solver = std::move(made);
   mpm.prepare();
+  balances->count_inertia(true, totals(scene, communicator));
   begin_stage(stage, mpm.stable_step());
   if (!scene.contacts.empty() && scene.is_saturated() && stage_scheme.basis == Basis::q1)
     log.line(

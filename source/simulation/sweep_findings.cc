@@ -1,5 +1,6 @@
 #include "sweep_output.h"
 
+#include <peat/base/nan.h>
 #include <peat/base/text.h>
 #include <peat/simulation/difference.h>
 #include <peat/simulation/log.h>
@@ -13,8 +14,6 @@
 
 namespace peat {
 namespace {
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
 std::optional<std::size_t> finest_run(const std::vector<SweepRun> &runs)
 {
   std::optional<std::size_t> finest;

@@ -3,6 +3,7 @@
 #include "child_process.h"
 
 #include <peat/base/error.h>
+#include <peat/base/nan.h>
 #include <peat/base/text.h>
 #include <peat/simulation/commands.h>
 #include <peat/simulation/simulation.h>
@@ -22,8 +23,7 @@
 namespace peat {
 namespace {
 using State = SweepRun::State;
-using json = nlohmann::json;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using json = nlohmann::ordered_json;
 
 std::string read_text(const std::string &path)
 {

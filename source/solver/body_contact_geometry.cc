@@ -351,6 +351,12 @@ void BodyContact<dim>::find_surfaces()
     }
 }
 
-template class BodyContact<2>;
-template class BodyContact<3>;
+template void BodyContact<2>::take_all_nodes();
+template void BodyContact<2>::find_normals();
+template void BodyContact<2>::find_gaps();
+template void BodyContact<2>::find_surfaces();
+template void BodyContact<3>::take_all_nodes();
+template void BodyContact<3>::find_normals();
+template void BodyContact<3>::find_gaps();
+template void BodyContact<3>::find_surfaces();
 } // namespace peat

@@ -5,6 +5,8 @@
 #include <algorithm>
 
 namespace peat {
+static_assert(Sums<2>::mass == 0 && Sums<3>::mass == 0, "NodalFields::mass()");
+
 template <int dim>
 Continuum<dim>::Continuum(const SchemeParameters &scheme, const Grid<dim> &grid, Scene<dim> &scene,
                           std::vector<std::size_t> bodies)
@@ -34,6 +36,8 @@ Continuum<dim>::Continuum(const SchemeParameters &scheme, const Grid<dim> &grid,
     if (condition->surface_of().empty() || holds_body(condition->surface_of())) {
       conditions.push_back(condition->copy());
       has_loads = has_loads || condition->has_body_force();
+      for (unsigned int d = 0; d < dim; ++d)
+        has_ties = has_ties || condition->ties(d);
     }
   has_loads = has_loads || !surfaces.empty();
   if (scheme.basis == Basis::q1)
@@ -116,6 +120,8 @@ void Continuum<dim>::number_nodes(const std::vector<NodeId> &more_nodes)
   }
   if (!pressure)
     return;
+  if (has_ties)
+    couple_nodes();
   std::vector<CellId> cells;
   for (std::size_t b = 0; b < members.size(); ++b)
     if (body(b).material().mixture())
@@ -395,8 +401,18 @@ void Continuum<dim>::constrain_motion(Ledger<dim> &book)
   const auto before = share > 0. ? total_momentum() : dealii::Tensor<1, dim>();
   for (const auto &condition : conditions)
     condition->constrain_motion(active, nodal);
+  for (auto *field : {&nodal.velocity, &nodal.acceleration, &nodal.new_velocity})
+    tie(*field);
   if (share > 0.)
     book.impulse += share * (total_momentum() - before);
+}
+
+template <int dim>
+void Continuum<dim>::tie(std::vector<double> &motion) const
+{
+  if (has_ties)
+    for (const auto &condition : conditions)
+      condition->tie(active, nodal, motion);
 }
 
 template <int dim>
@@ -491,8 +507,11 @@ void Continuum<dim>::prepare_pressure()
 template <int dim>
 void Continuum<dim>::take_pressure()
 {
-  if (pressure)
-    pressure->update(nodal);
+  if (!pressure)
+    return;
+  pressure->update(nodal);
+  tie(nodal.acceleration);
+  tie(nodal.new_velocity);
 }
 
 template <int dim>
@@ -552,6 +571,7 @@ void Continuum<dim>::advance_points()
   }
   for (const auto &condition : conditions)
     condition->constrain_velocity(active, nodal.time + nodal.dt, nodal.dt, mapped_velocity);
+  tie(mapped_velocity);
 }
 
 template <int dim>

@@ -53,8 +53,13 @@ ExplicitMPM<dim>::ExplicitMPM(const SchemeParameters &scheme, const Grid<dim> &g
   for (const auto &continuum : continua)
     if (ImplicitPressure<dim> *pressure = continuum->implicit_pressure())
       implicit.push_back(pressure);
-  pressures.reinit(std::move(implicit), contact.is_empty() ? nullptr : &contact, scheme.pressure_tolerance,
-                   grid.communicator());
+  // Without contacts there is one continuum.
+  NodalCoupling *coupling = nullptr;
+  if (!contact.is_empty())
+    coupling = &contact;
+  else if (continua.front()->ties_nodes())
+    coupling = continua.front().get();
+  pressures.reinit(std::move(implicit), coupling, scheme.pressure_tolerance, grid.communicator());
 }
 
 template <int dim>

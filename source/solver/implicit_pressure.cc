@@ -16,18 +16,32 @@ constexpr unsigned int most_with_diagonal = 25;
 /// Mid-step velocity: new velocity minus this times dt a.
 constexpr double half = 0.5;
 
-/// Of the values around a node: their sum, and what alternates in each set of directions (bits of the index).
-/// Twice this is the same as n_corners times the values.
-template <int dim>
-inline void split_by_alternation(double *value)
+/// Turn the values around a node into what alternates in them, in two directions at least, times a factor and
+/// the response to it: of directions x and y; in 3-D of x and y, x and z, y and z, all three.
+inline void damp_alternation(double (&value)[4], const double factor, const double *response)
 {
-  for (unsigned int bit = 1; bit < 1u << dim; bit *= 2)
-    for (unsigned int v = 0; v < 1u << dim; ++v)
-      if (!(v & bit)) {
-        const double sum = value[v] + value[v | bit], difference = value[v] - value[v | bit];
-        value[v] = sum;
-        value[v | bit] = difference;
-      }
+  const double alternating = factor * response[0] * (value[0] - value[1] - value[2] + value[3]);
+  value[0] = value[3] = alternating;
+  value[1] = value[2] = -alternating;
+}
+
+inline void damp_alternation(double (&value)[8], const double factor, const double *response)
+{
+  double sum[4], difference[4];
+  for (unsigned int v = 0; v < 4; ++v) {
+    sum[v] = value[v] + value[v + 4];
+    difference[v] = value[v] - value[v + 4];
+  }
+  const double along = difference[0] - difference[3], across = difference[1] - difference[2];
+  const double xy = factor * response[0] * (sum[0] - sum[1] - sum[2] + sum[3]),
+               xz = factor * response[1] * (along - across), yz = factor * response[2] * (along + across),
+               xyz = factor * response[3] * (difference[0] + difference[3] - difference[1] - difference[2]);
+  const double here[4] = {xyz + (xz + yz), (yz - xz) - xyz, (xz - yz) - xyz, xyz - (xz + yz)};
+  for (unsigned int v = 0; v < 4; ++v) {
+    const double same = v == 0 || v == 3 ? xy : -xy;
+    value[v] = same + here[v];
+    value[v + 4] = same - here[v];
+  }
 }
 } // namespace
 
@@ -318,13 +332,9 @@ void ImplicitPressure<dim>::add_stabilisation(const Vector &pressures, const dou
     double value[n_corners];
     for (unsigned int v = 0; v < n_corners; ++v)
       value[v] = pressure[unknowns[v]];
-    split_by_alternation<dim>(value);
-    double scaled[n_corners] = {};
-    for (unsigned int m = 0; m < n_modes; ++m)
-      scaled[mode_directions[m]] = factor * mode_response[i * n_modes + m] * value[mode_directions[m]];
-    split_by_alternation<dim>(scaled);
+    damp_alternation(value, factor, &mode_response[i * n_modes]);
     for (unsigned int v = 0; v < n_corners; ++v)
-      image[unknowns[v]] += scaled[v];
+      image[unknowns[v]] += value[v];
   }
   if (dealii::Utilities::MPI::n_mpi_processes(communicator) == 1)
     return;
@@ -409,6 +419,12 @@ void ImplicitPressure<dim>::make_multigrid()
     star.set(first + k, first + k, own);
   }
   star.compress(dealii::VectorOperation::insert);
+  // ML adds 1e-12 to the diagonal of the coarsest level, whatever stands there; these are small numbers. To
+  // conjugate gradients the factor means nothing.
+  double largest = 0.;
+  for (std::size_t k = 0; k < sums.storage.size(); ++k)
+    largest = std::max(largest, star.diag_element(first + k));
+  star *= 1. / dealii::Utilities::MPI::max(largest, communicator);
 
   Teuchos::ParameterList list;
   ML_Epetra::SetDefaults("SA", list);

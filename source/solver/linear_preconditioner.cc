@@ -2,12 +2,16 @@
 
 #include <peat/base/error.h>
 
+#include <deal.II/base/mpi.h>
+
 #include <EpetraExt_MatrixMatrix.h>
 #include <Epetra_Import.h>
 #include <Teuchos_ParameterList.hpp>
 #include <ml_MultiLevelPreconditioner.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace peat {
 using BlockMatrix = LinearSolver::BlockMatrix;
@@ -30,8 +34,8 @@ Teuchos::ParameterList multigrid_settings()
 }
 
 /// a A + b B for matrices of different patterns but the same maps.
-void sum(TrilinosMatrix &result, const TrilinosMatrix &A, const double a, const TrilinosMatrix &B,
-         const double b)
+void add_scaled(TrilinosMatrix &result, const TrilinosMatrix &A, const double a, const TrilinosMatrix &B,
+                const double b)
 {
   Epetra_CrsMatrix *total = nullptr;
   EpetraExt::MatrixMatrix::Add(A.trilinos_matrix(), false, a, B.trilinos_matrix(), false, b, total);
@@ -122,31 +126,118 @@ std::vector<double> rigid_body_modes(const DisplacementUnknowns &unknowns)
   return modes;
 }
 
-void Multigrid::build(const TrilinosMatrix &matrix, const unsigned int n_components)
+void Multigrid::build(TrilinosMatrix &matrix, const unsigned int n_components)
 {
+  factor = 1. / absolute_diagonal(matrix).linfty_norm();
+  matrix *= factor;
   Teuchos::ParameterList list = multigrid_settings();
   list.set("PDE equations", int(n_components));
   amg.initialize(matrix, list);
 }
 
-void Multigrid::build(const TrilinosMatrix &matrix, const unsigned int dim, const std::vector<double> &modes)
+std::vector<std::vector<double>> lattice_places(const DisplacementUnknowns &unknowns, MPI_Comm communicator)
 {
+  std::vector<std::vector<double>> places(unknowns.dim);
+  for (unsigned int d = 0; d < unknowns.dim; ++d) {
+    std::set<double> mine;
+    for (const auto &x : unknowns.positions)
+      mine.insert(x[d]);
+    std::vector<double> planes;
+    for (const auto &of_rank :
+         dealii::Utilities::MPI::all_gather(communicator, std::vector<double>(mine.begin(), mine.end())))
+      planes.insert(planes.end(), of_rank.begin(), of_rank.end());
+    std::sort(planes.begin(), planes.end());
+    // Round-off apart.
+    const double close = planes.empty() ? 0. : 1e-9 * (planes.back() - planes.front());
+    planes.erase(std::unique(planes.begin(), planes.end(),
+                             [&](const double a, const double b) { return b - a <= close; }),
+                 planes.end());
+    for (std::size_t i = 0; i < unknowns.positions.size(); i += unknowns.dim)
+      places[d].push_back(std::upper_bound(planes.begin(), planes.end(), unknowns.positions[i][d] + close) -
+                          planes.begin());
+  }
+  return places;
+}
+
+namespace {
+/// The largest sum of 1 / distance^2 over the nodes that a node is coupled with.
+double largest_closeness(const TrilinosMatrix &stiffness, const std::vector<std::vector<double>> &places)
+{
+  const Epetra_CrsMatrix &matrix = stiffness.trilinos_matrix();
+  const int dim = places.size();
+  double largest = 0.;
+  for (int row = 0; row < matrix.NumMyRows(); row += dim) {
+    int length, *columns;
+    double *values, sum = 0.;
+    matrix.ExtractMyRowView(row, length, values, columns);
+    for (int k = 0; k < length; ++k) {
+      const int other = matrix.LRID(matrix.GCID64(columns[k]));
+      if (other < 0 || other % dim != 0 || other == row)
+        continue;
+      double distance = 0.;
+      for (const auto &place : places)
+        distance += std::pow(place[other / dim] - place[row / dim], 2);
+      // Beyond what functions reach there are only those that are tied to something.
+      constexpr double farthest = 3.;
+      if (distance <= dim * farthest * farthest)
+        sum += 1. / distance;
+    }
+    largest = std::max(largest, sum);
+  }
+  double over_ranks = 0.;
+  matrix.Comm().MaxAll(&largest, &over_ranks, 1);
+  return over_ranks;
+}
+} // namespace
+
+void Multigrid::build(const TrilinosMatrix &matrix, const std::vector<double> &modes,
+                      const std::vector<std::vector<double>> &places)
+{
+  const unsigned int dim = places.size();
   Teuchos::ParameterList list = multigrid_settings();
   list.set("PDE equations", int(dim));
   list.set("null space: type", "pre-computed");
   list.set("null space: add default vectors", false);
   list.set("null space: dimension", int(dim == 2 ? 3 : 6));
-  // ML takes a plain pointer and only reads from it; a rank without unknowns still needs one.
+  // ML takes plain pointers and only reads from them; a rank without unknowns still needs one.
   static double nothing = 0.;
-  list.set("null space: vectors", modes.empty() ? &nothing : const_cast<double *>(modes.data()));
+  const auto pointer = [](const std::vector<double> &values) {
+    return values.empty() ? &nothing : const_cast<double *>(values.data());
+  };
+  list.set("null space: vectors", pointer(modes));
+  // Nodes of Q2 or of GIMP are coupled with up to 124 or 342 others, and aggregates of a node and all of
+  // these are too large: iterations then grow with the mesh. Here they are made of neighbours on the lattice
+  // of nodes alone. ML keeps what is closer than a share of the closeness of all others: between diagonals
+  // and every second node.
+  // What it drops it adds to the diagonal when it estimates the largest eigenvalue, which may then be far
+  // off, where there is much inertia above all. So the smoother must do without it: two sweeps forth and back
+  // cost as much as a Chebyshev polynomial of fourth degree.
+  const double closeness = largest_closeness(matrix, places);
+  if (closeness > 0.) {
+    list.set("smoother: type", "symmetric Gauss-Seidel");
+    list.set("smoother: sweeps", 2);
+    list.set("aggregation: aux: enable", true);
+    list.set("aggregation: aux: max levels", 1);
+    list.set("aggregation: aux: threshold", 1. / (2. * std::sqrt(double(dim)) * closeness));
+    const char *names[] = {"x-coordinates", "y-coordinates", "z-coordinates"};
+    for (unsigned int d = 0; d < dim; ++d)
+      list.set(names[d], pointer(places[d]));
+  }
   amg.initialize(matrix, list);
+}
+
+void Multigrid::vmult(TrilinosVector &result, const TrilinosVector &source) const
+{
+  amg.vmult(result, source);
+  if (factor != 1.)
+    result *= factor;
 }
 
 void SchurInverse::build(const BlockMatrix &matrix, const PreconditionerData &data)
 {
   const TrilinosMatrix &D = matrix.block(1, 1);
   if (data.pressure_mass)
-    sum(stiff, *data.pressure_mass, 1., D, -1.);
+    add_scaled(stiff, *data.pressure_mass, 1., D, -1.);
   else {
     stiff.copy_from(D);
     stiff *= -1.;
@@ -157,7 +248,7 @@ void SchurInverse::build(const BlockMatrix &matrix, const PreconditionerData &da
   if (has_inertia) {
     TrilinosMatrix product;
     matrix.block(1, 0).mmult(product, matrix.block(0, 1), inverse(*data.inertia));
-    sum(inert, product, 1., D, -1.);
+    add_scaled(inert, product, 1., D, -1.);
     make_diagonal_positive(inert);
     inert_inverse.build(inert, 1);
   }
@@ -230,7 +321,7 @@ void VolumetricInverse::vmult(TrilinosVector &result, const TrilinosVector &sour
 }
 
 BlockPreconditioner::BlockPreconditioner(const DisplacementUnknowns &unknowns)
-    : dim(unknowns.dim), modes(rigid_body_modes(unknowns))
+    : unknowns(unknowns), modes(rigid_body_modes(unknowns))
 {}
 
 void BlockPreconditioner::build(const BlockMatrix &new_matrix, const PreconditionerData &new_data)
@@ -238,7 +329,9 @@ void BlockPreconditioner::build(const BlockMatrix &new_matrix, const Preconditio
   matrix = &new_matrix;
   data = new_data;
   const TrilinosMatrix &stiffness = data.shear ? *data.shear : matrix->block(0, 0);
-  displacement.build(stiffness, dim, modes);
+  if (places.empty())
+    places = lattice_places(unknowns, matrix->get_mpi_communicator());
+  displacement.build(stiffness, modes, places);
   if (data.shear)
     volumetric.build(data);
   if (matrix->n_block_rows() == 2)

@@ -49,13 +49,18 @@ private:
 class Multigrid
 {
 public:
-  /// n_components unknowns stand together at each place; the near-null space is constant in each.
-  void build(const TrilinosMatrix &matrix, unsigned int n_components);
-  /// Displacements; modes [n_modes * n_owned] span the near-null space and must live as long as this.
-  void build(const TrilinosMatrix &matrix, unsigned int dim, const std::vector<double> &modes);
-  void vmult(TrilinosVector &result, const TrilinosVector &source) const { amg.vmult(result, source); }
+  /// n_components unknowns stand together at each place; the near-null space is constant in each. Scales the
+  /// matrix: ML adds 1e-12 to the diagonal of the coarsest level, whatever stands there. Compliances are of
+  /// that size, and long waves would be lost.
+  void build(TrilinosMatrix &matrix, unsigned int n_components);
+  /// Displacements, whose stiffnesses are large numbers; modes [n_modes * n_owned] span the near-null space,
+  /// places are those of the nodes, by direction, in steps from node to node. Both must live as long as this.
+  void build(const TrilinosMatrix &matrix, const std::vector<double> &modes,
+             const std::vector<std::vector<double>> &places);
+  void vmult(TrilinosVector &result, const TrilinosVector &source) const;
 
 private:
+  double factor = 1.; ///< on the matrix
   dealii::TrilinosWrappers::PreconditionAMG amg;
 };
 
@@ -131,6 +136,7 @@ private:
 class BlockPreconditioner : public LinearSolver::Preconditioner
 {
 public:
+  /// `unknowns` must live as long as this.
   explicit BlockPreconditioner(const DisplacementUnknowns &unknowns);
   void build(const LinearSolver::BlockMatrix &matrix, const PreconditionerData &data) override;
   void vmult(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const override;
@@ -143,8 +149,9 @@ private:
   /// in which u and p hardly meet: div u sees p - Pi p only.
   void solve_pressures(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const;
 
-  const unsigned int dim;
-  std::vector<double> modes;
+  const DisplacementUnknowns &unknowns;
+  const std::vector<double> modes;
+  std::vector<std::vector<double>> places;
   const LinearSolver::BlockMatrix *matrix = nullptr;
   PreconditionerData data;
   Multigrid displacement;
@@ -156,6 +163,10 @@ private:
 /// The rigid-body modes of the unknowns, mode after mode: dim translations, then 1 or 3 rotations about the
 /// middle; 0 at fixed unknowns. [n_modes * n_owned]
 std::vector<double> rigid_body_modes(const DisplacementUnknowns &unknowns);
+
+/// Where this rank's nodes stand among the planes of nodes of all ranks, by direction [dim][n_nodes].
+/// Collective.
+std::vector<std::vector<double>> lattice_places(const DisplacementUnknowns &unknowns, MPI_Comm communicator);
 
 /// Diagonal of C diag(A)^-1 C^T.
 TrilinosVector diagonal_of_product(const TrilinosMatrix &C, const TrilinosVector &diagonal_of_A);

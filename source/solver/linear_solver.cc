@@ -51,7 +51,7 @@ LinearSolverParameters::LinearSolverParameters(Section section)
       "Residual over right-hand side at which a solution is good enough. A looser one saves iterations, and "
       "leaves what it leaves to the next Newton step.");
   section.add("Iterations", max_iterations, Range{"", 1.},
-              "Largest number of iterations before the run ends with an error. 15 to 60 are usual.");
+              "Largest number of iterations before the run ends with an error. 10 to 40 are usual.");
 }
 
 LinearSolver::LinearSolver(const LinearSolverParameters &parameters, std::string purpose)

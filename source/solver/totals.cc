@@ -85,8 +85,28 @@ Totals<dim> totals(const Scene<dim> &scene, MPI_Comm communicator)
 }
 
 template <int dim>
-void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MPI_Comm communicator)
+Totals<dim> Totals<dim>::without_inertia() const
 {
+  Totals<dim> rest = *this;
+  rest.kinetic_energy = rest.largest_speed = 0.;
+  rest.momentum = dealii::Tensor<1, dim>();
+  return rest;
+}
+
+template <int dim>
+void Balances<dim>::count_inertia(const bool inertia, const Totals<dim> &now)
+{
+  const Totals<dim> before = counted(now);
+  has_inertia = inertia;
+  const Totals<dim> after = counted(now);
+  start.kinetic_energy += after.kinetic_energy - before.kinetic_energy;
+  start.momentum += after.momentum - before.momentum;
+}
+
+template <int dim>
+void Balances<dim>::update(const Totals<dim> &sums, const Ledger<dim> &ledger, MPI_Comm communicator)
+{
+  const Totals<dim> now = counted(sums);
   std::vector<double> values = {ledger.external_work, ledger.gravity_work,       ledger.seepage_dissipation,
                                 ledger.seepage_work,  ledger.fluid_outflow,      ledger.fluid_squeezed,
                                 ledger.gross_impulse, ledger.contact_dissipation};
@@ -124,8 +144,9 @@ void Balances<dim>::update(const Totals<dim> &now, const Ledger<dim> &ledger, MP
 }
 
 template <int dim>
-void Balances<dim>::admit(const Totals<dim> &before, const Totals<dim> &after)
+void Balances<dim>::admit(const Totals<dim> &sums_before, const Totals<dim> &sums_after)
 {
+  const Totals<dim> before = counted(sums_before), after = counted(sums_after);
   start.mass += after.mass - before.mass;
   start.fluid_volume += after.fluid_volume - before.fluid_volume;
   start.kinetic_energy += after.kinetic_energy - before.kinetic_energy;

@@ -3,6 +3,9 @@
 #include <deal.II/base/mpi.h>
 #include <peat/material/mixture.h>
 
+#include <limits>
+#include <set>
+
 #include "cell_shapes.h"
 
 namespace peat {
@@ -70,11 +73,20 @@ void UpBoundary<dim>::locate(const ActiveNodes<dim> &active, const std::vector<I
   for (const Piece &piece : pieces)
     any_pressure = any_pressure || piece.weak_pressure;
   any_pressure = dealii::Utilities::MPI::max(int(any_pressure), grid.communicator()) > 0;
+  find_ties(unused_unknowns);
+  make_constraints(unused_unknowns);
+}
 
+template <int dim>
+void UpBoundary<dim>::make_constraints(const std::vector<Index> &unused_unknowns)
+{
+  rows = space.relevant();
+  for (const Tie &tie : ties)
+    rows[0].add_index(tie.common);
   dealii::IndexSet relevant(space.n_unknowns());
-  relevant.add_indices(space.relevant()[0]);
+  relevant.add_indices(rows[0]);
   if (space.has_pressure())
-    relevant.add_indices(space.relevant()[1], space.first_pressure());
+    relevant.add_indices(rows[1], space.first_pressure());
   relevant.compress();
   homogeneous.clear();
   homogeneous.reinit(relevant);
@@ -82,6 +94,11 @@ void UpBoundary<dim>::locate(const ActiveNodes<dim> &active, const std::vector<I
     homogeneous.add_line(motion.unknown);
   for (const GivenPressure &given : pressures)
     homogeneous.add_line(given.unknown);
+  for (const Tie &tie : ties)
+    for (const Index unknown : tie.members) {
+      homogeneous.add_line(unknown);
+      homogeneous.add_entry(unknown, tie.common, 1.);
+    }
   homogeneous.close();
   unused_only.clear();
   unused_only.reinit(relevant);
@@ -116,6 +133,91 @@ void UpBoundary<dim>::find_motions()
         add(-1);
     }
   }
+}
+
+template <int dim>
+void UpBoundary<dim>::find_ties(const std::vector<Index> &unused_unknowns)
+{
+  ties.clear();
+  const std::set<Index> unused(unused_unknowns.begin(), unused_unknowns.end());
+  const double tolerance = Place<dim>::tolerance(grid);
+  for (const auto &condition : scene.conditions)
+    for (unsigned int d = 0; d < dim; ++d) {
+      if (!condition->ties(d))
+        continue;
+      const Place<dim> &place = condition->place;
+      unsigned int faces = 0;
+      for (const unsigned int boundary : place.boundaries)
+        faces |= 1u << boundary;
+      // The first of all stands for them, on whatever rank it is.
+      const Index none = std::numeric_limits<Index>::max();
+      Tie tie{none, {}};
+      for (const auto &node : space.displacement_nodes()) {
+        const Index unknown = node.displacement[d];
+        if (place.contains_node(node.position, tolerance) && unused.count(unknown) == 0 &&
+            (faces == 0 || (space.boundaries_at(node.position) & faces))) {
+          tie.members.push_back(unknown);
+          tie.common = std::min(tie.common, unknown);
+        }
+      }
+      tie.common = dealii::Utilities::MPI::min(tie.common, grid.communicator());
+      if (tie.common == none)
+        continue;
+      tie.members.erase(std::remove(tie.members.begin(), tie.members.end(), tie.common), tie.members.end());
+      ties.push_back(std::move(tie));
+    }
+}
+
+namespace {
+/// The value of an unknown that this rank may own.
+double *owned_value(dealii::TrilinosWrappers::MPI::Vector &vector, const dealii::IndexSet &owned,
+                    const dealii::types::global_dof_index unknown)
+{
+  return owned.is_element(unknown) ? &vector.trilinos_vector()[0][owned.index_within_set(unknown)] : nullptr;
+}
+} // namespace
+
+template <int dim>
+void UpBoundary<dim>::gather(dealii::TrilinosWrappers::MPI::Vector &displacement) const
+{
+  const dealii::IndexSet &owned = space.owned()[0];
+  for (const Tie &tie : ties) {
+    double sum = 0.;
+    for (const Index unknown : tie.members)
+      if (const double *value = owned_value(displacement, owned, unknown))
+        sum += *value;
+    sum = dealii::Utilities::MPI::sum(sum, grid.communicator());
+    if (double *value = owned_value(displacement, owned, tie.common))
+      *value += sum;
+  }
+}
+
+template <int dim>
+void UpBoundary<dim>::condense(BlockVector &forces) const
+{
+  gather(forces.block(0));
+  homogeneous.set_zero(forces);
+}
+
+template <int dim>
+void UpBoundary<dim>::distribute(dealii::TrilinosWrappers::MPI::Vector &displacement) const
+{
+  homogeneous.set_zero(displacement);
+  const dealii::IndexSet &owned = space.owned()[0];
+  for (const Tie &tie : ties) {
+    const double *mine = owned_value(displacement, owned, tie.common);
+    const double common = dealii::Utilities::MPI::sum(mine ? *mine : 0., grid.communicator());
+    for (const Index unknown : tie.members)
+      if (double *value = owned_value(displacement, owned, unknown))
+        *value = common;
+  }
+}
+
+template <int dim>
+void UpBoundary<dim>::distribute(BlockVector &motion) const
+{
+  homogeneous.set_zero(motion);
+  distribute(motion.block(0));
 }
 
 template <int dim>

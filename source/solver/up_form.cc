@@ -2,7 +2,10 @@
 
 #include <peat/material/mixture.h>
 
+#include "form_filling.h"
 #include "form_matrices.h"
+
+#include <map>
 
 namespace peat {
 namespace {
@@ -18,6 +21,7 @@ public:
   PointForm(const Space<dim> &space, const bool projects) : space(space), cell(space, projects) {}
 
   unsigned int n_volumetric() const override { return cell.projection() ? Matrices::n_psi : 0; }
+  void survey(const Body<dim> &body) override;
   void assemble(const Body<dim> &body, const TimeLevel &level, const StepState &state,
                 const VolumeLoads<dim> &loads, double stabilisation, const UpSystem &system) override;
   void update_points(Body<dim> &body, const TimeLevel &level, const StepState &state,
@@ -61,14 +65,36 @@ private:
   /// For the stabilisation [1/Pa]: the larger of 1/M (one-dimensional optimum) and 1/(4 G) at the start of
   /// the step.
   double compliance(const Body<dim> &body) const;
+  void begin_cell(const Body<dim> &body, CellId cell);
+  /// Of the points of the present cell, with regard to how full it is.
+  Lanes mobility(const Body<dim> &body, Lanes porosity) const
+  {
+    return filled * body.material().mixture()->mobility(porosity);
+  }
 
   const Space<dim> &space;
+  std::map<const Body<dim> *, std::vector<double>> filling_of; ///< by cells; nothing where it is 1
+  double filled = 1.;                                          ///< of the present cell
   Cell cell;
   std::vector<dealii::types::global_dof_index> unknowns;
   dealii::Vector<double> local_residual;
   dealii::FullMatrix<double> local_matrix;
   Matrices matrices;
 };
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::survey(const Body<dim> &body)
+{
+  if (reach == 4 && body.material().mixture())
+    filling_of[&body] = filling(space.grid(), body);
+}
+
+template <int dim, unsigned int reach>
+void PointForm<dim, reach>::begin_cell(const Body<dim> &body, const CellId cell)
+{
+  const auto known = filling_of.find(&body);
+  filled = known == filling_of.end() ? 1. : known->second[cell];
+}
 
 template <int dim, unsigned int reach>
 void PointForm<dim, reach>::add_residual(const Body<dim> &body, const Points &points, const TimeLevel &level,
@@ -126,7 +152,7 @@ void PointForm<dim, reach>::add_fluid_residual(const Body<dim> &body, const Poin
   const Mixture &mixture = *body.material().mixture();
   const double scale = level.fluid_scale(), inertia = level.seepage_inertia ? 1. : 0.;
   const Lanes V = points.volume, storage = fluid_storage_rate(body, points, level, at, loads);
-  const Lanes mobility = V * mixture.mobility(at.porosity);
+  const Lanes mobility = V * this->mobility(body, at.porosity);
   Lanes slope = {};
   for (unsigned int d = 0; d < dim; ++d)
     slope += at.pressure_gradient[d] * at.pressure_gradient[d];
@@ -165,7 +191,7 @@ void PointForm<dim, reach>::add_matrices(const Body<dim> &body, const std::size_
     c.alpha = mixture->biot_coefficient();
     c.fluid_density = mixture->fluid_density();
     c.storage = mixture->storage(here.porosity);
-    c.mobility = mixture->mobility(here.porosity);
+    c.mobility = mobility(body, here.porosity);
   }
   if (has_pressure && c.finite_strain) {
     // n gains 1 - n per volumetric strain. 1/Q is linear in it.
@@ -174,9 +200,8 @@ void PointForm<dim, reach>::add_matrices(const Body<dim> &body, const std::size_
     c.storage_rate =
         fluid_storage_rate(body, cell.points(batch), level, here, loads) +
         here.pressure_rate * solid * (mixture->storage(broadcast(1.)) - mixture->storage(broadcast(0.)));
-    c.mobility_slope = solid *
-                       (mixture->mobility(here.porosity + step) - mixture->mobility(here.porosity - step)) /
-                       (2. * step);
+    c.mobility_slope =
+        solid * (mobility(body, here.porosity + step) - mobility(body, here.porosity - step)) / (2. * step);
     const double inertia = level.seepage_inertia ? 1. : 0.;
     for (unsigned int d = 0; d < dim; ++d) {
       c.p_slope[d] = here.pressure_gradient[d];
@@ -257,6 +282,7 @@ void PointForm<dim, reach>::assemble(const Body<dim> &body, const TimeLevel &lev
   if (system.matrix)
     local_matrix.reinit(n, n);
   for (const Slice &slice : body.slices()) {
+    begin_cell(body, slice.cell);
     cell.load(slice.cell, saturated, level, state);
     local_residual = 0.;
     cell.evaluate(body, slice, level, saturated && !has_pressure ? mean_pressure(body, slice) : 0.);
@@ -323,9 +349,11 @@ void PointForm<dim, reach>::add_split(const TimeLevel &level, const bool has_pre
   system.constraints.distribute_local_to_global(shear, displacements, split.shear);
   for (unsigned int k = 0; k < Matrices::n_psi; ++k) {
     const auto number = split.next++;
-    for (unsigned int i = 0; i < n_u; ++i)
-      if (!system.constraints.is_constrained(displacements[i]))
-        split.gradient.add(displacements[i], number, volumetric.gradient(k, i));
+    for (unsigned int i = 0; i < n_u; ++i) {
+      const auto row = equation_of(system.constraints, displacements[i]);
+      if (!system.constraints.is_constrained(row))
+        split.gradient.add(row, number, volumetric.gradient(k, i));
+    }
     split.volumetric_compliance(number) = norms[k] / (level.share * volumetric.modulus[k]);
     split.shear_compliance(number) = norms[k] / (2. * level.share * volumetric.shear_modulus);
     for (unsigned int i = 0; i < n_p && has_pressure; ++i)
@@ -381,6 +409,7 @@ void PointForm<dim, reach>::book_seepage(const Body<dim> &body, const TimeLevel 
   if (!body.material().mixture() || !space.has_pressure())
     return;
   for (const Slice &slice : body.slices()) {
+    begin_cell(body, slice.cell);
     cell.load(slice.cell, true, level, state);
     cell.evaluate(body, slice, level, 0.);
     for (std::size_t b = 0; b < cell.n_batches(); ++b)
@@ -402,7 +431,7 @@ void PointForm<dim, reach>::book_seepage(const Body<dim> &body, const Points &po
     squared += R * R;
   }
   const Lanes squeezed = mixture.biot_coefficient() * at.velocity_divergence;
-  work.seepage_dissipation += level.dt * sum(points.volume * mixture.mobility(at.porosity) * squared);
+  work.seepage_dissipation += level.dt * sum(points.volume * mobility(body, at.porosity) * squared);
   work.seepage_work += level.dt * sum(points.volume * at.pressure *
                                       (mixture.storage(at.porosity) * at.pressure_rate + squeezed));
   if (!body.material().law().finite_strain())

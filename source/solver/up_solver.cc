@@ -78,8 +78,10 @@ void UpSolver<dim>::prepare()
       if (body->material().mixture() && method != Method::points_at_rest)
         saturated.push_back(slice.cell);
     }
-  for (const auto &body : scene.bodies)
+  for (const auto &body : scene.bodies) {
     body->accept_cells();
+    form->survey(*body);
+  }
   sort(solid);
   sort(saturated);
   unknowns.distribute(solid, saturated);
@@ -118,7 +120,7 @@ template <int dim>
 void UpSolver<dim>::resize()
 {
   const MPI_Comm communicator = grid.communicator();
-  dealii::BlockDynamicSparsityPattern pattern(unknowns.relevant());
+  dealii::BlockDynamicSparsityPattern pattern(boundary.relevant());
   std::vector<typename Space<dim>::Index> list;
   for (const auto &body : scene.bodies)
     for (const Slice &slice : body->slices()) {
@@ -143,12 +145,13 @@ void UpSolver<dim>::resize()
   dealii::IndexSet owned(unknowns.n_unknowns()), relevant(unknowns.n_unknowns());
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b) {
     owned.add_indices(unknowns.owned()[b], b * unknowns.first_pressure());
-    relevant.add_indices(unknowns.relevant()[b], b * unknowns.first_pressure());
+    relevant.add_indices(boundary.relevant()[b], b * unknowns.first_pressure());
   }
   // Unknowns on a rank's edge whose cells lie on other ranks have no entry yet, and need a diagonal.
   for (const auto index : owned)
     pattern.add(index, index);
   dealii::SparsityTools::distribute_sparsity_pattern(pattern, owned, communicator, relevant);
+  linear_solver.reinit({}); // a preconditioner goes before its matrix
   matrix.clear();
   matrix.reinit(unknowns.owned(), pattern, communicator);
   matrix_is_valid = false;
@@ -193,6 +196,7 @@ void UpSolver<dim>::describe_unknowns()
   for (const auto &body : scene.bodies)
     form->sum_inertia(*body, mass_diagonal);
   mass_diagonal.compress(dealii::VectorOperation::add);
+  boundary.gather(mass_diagonal);
   const double largest = mass_diagonal.linfty_norm();
   for (const auto index : owned)
     if (mass_diagonal(index) == 0.)
@@ -221,7 +225,7 @@ void UpSolver<dim>::prepare_split()
   split = std::make_unique<VolumetricSplit>();
   split->first = first;
   const dealii::IndexSet &u = unknowns.owned()[0];
-  dealii::TrilinosWrappers::SparsityPattern gradient(u, functions, unknowns.relevant()[0], communicator);
+  dealii::TrilinosWrappers::SparsityPattern gradient(u, functions, boundary.relevant()[0], communicator);
   std::unique_ptr<dealii::TrilinosWrappers::SparsityPattern> projection;
   if (unknowns.has_pressure())
     projection = std::make_unique<dealii::TrilinosWrappers::SparsityPattern>(functions, unknowns.owned()[1],
@@ -232,8 +236,10 @@ void UpSolver<dim>::prepare_split()
       for (auto &number : own)
         number = first++;
       const auto *cell = unknowns.displacements(slice.cell);
-      for (unsigned int i = 0; i < unknowns.n_cell_nodes() * dim; ++i)
+      for (unsigned int i = 0; i < unknowns.n_cell_nodes() * dim; ++i) {
         gradient.add_entries(cell[i], own.begin(), own.end());
+        gradient.add_entries(equation_of(boundary.constraints(), cell[i]), own.begin(), own.end());
+      }
       if (!projection || !body->material().mixture())
         continue;
       for (unsigned int i = 0; i < Space<dim>::n_pressures; ++i)
@@ -335,7 +341,7 @@ void UpSolver<dim>::assemble(const TimeLevel &level, const bool with_matrix)
   contact.assemble(level, state, system);
   residual.compress(dealii::VectorOperation::add);
   right_side = residual;
-  boundary.constraints().set_zero(right_side);
+  boundary.condense(right_side);
   if (!with_matrix)
     return;
   fill_empty_diagonal(level);
@@ -386,6 +392,15 @@ double UpSolver<dim>::residual_norm(const unsigned int block, const double toler
 }
 
 template <int dim>
+double UpSolver<dim>::residual_size(const double tolerance) const
+{
+  double squared = 0.;
+  for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
+    squared += std::pow(residual_norm(b, tolerance), 2);
+  return std::sqrt(squared);
+}
+
+template <int dim>
 bool UpSolver<dim>::converged(const double tolerance) const
 {
   for (unsigned int b = 0; b < unknowns.n_blocks(); ++b)
@@ -423,7 +438,7 @@ void UpSolver<dim>::solve(const TimeLevel &level, const double start, const doub
     correction = 0.;
     const auto solve_system = [&](BlockVector &solution, const BlockVector &forces) {
       done.linear_iterations += linear_solver.solve(solution, forces);
-      boundary.constraints().set_zero(solution);
+      boundary.distribute(solution);
       ++done.linear_solves;
     };
     solve_system(correction, right_side);
@@ -431,7 +446,7 @@ void UpSolver<dim>::solve(const TimeLevel &level, const double start, const doub
     ++done.newton_iterations;
     unknown += correction;
     if (!linear)
-      line_search(level, right_side.l2_norm());
+      line_search(level, residual_size(tolerance));
     share_unknown();
     contact.augment(state);
   }
@@ -454,12 +469,13 @@ void UpSolver<dim>::give_up(const unsigned int iterations, const double start, c
 template <int dim>
 void UpSolver<dim>::line_search(const TimeLevel &level, const double before)
 {
-  // Full steps unless they make things worse.
+  // Full steps unless they make things worse. Force and volume are no number together: a stage begins with
+  // forces that are in balance and volumes that are not.
   constexpr unsigned int most_halvings = 5;
   double length = 1.;
   for (unsigned int k = 0; k < most_halvings; ++k) {
     assemble(level, false);
-    const double after = right_side.l2_norm();
+    const double after = residual_size(parameters.newton_tolerance);
     // Where sites touch or part it is the next iteration that knows their forces.
     if (std::isfinite(after) && (after <= before || contact.changes_matrix()))
       return;
@@ -509,31 +525,6 @@ void UpSolver<dim>::accept(const TimeLevel &level, const bool moves)
 }
 
 template <int dim>
-void UpSolver<dim>::move_tracers()
-{
-  if (method == Method::finite_elements) {
-    if (!scene.probes)
-      return;
-    ghosted_total = total;
-    scene.probes->place(
-        [&](const dealii::Point<dim> &x) { return unknowns.value(ghosted_total.block(0), x); });
-    return;
-  }
-  // Tracers know vertices only; what lies between is what the points see, too.
-  std::vector<double> step(std::size_t(active.size()) * dim, 0.);
-  for (unsigned int i = 0; i < active.size(); ++i)
-    if (const auto *node = unknowns.node_at(active.grid_node(i)))
-      for (unsigned int d = 0; d < dim; ++d)
-        step[std::size_t(i) * dim + d] = state.unknown.block(0)(node->displacement[d]);
-  for (auto &[name, tracers] : scene.surfaces)
-    tracers.move(step, 1., scene.body(name).material().law().finite_strain(), active);
-  if (scene.probes) {
-    scene.probes->locate(active);
-    scene.probes->move(step, 1., false, active);
-  }
-}
-
-template <int dim>
 bool UpSolver<dim>::reach_changes()
 {
   const auto before = small_nodes.unused();
@@ -576,11 +567,12 @@ void UpSolver<dim>::relocate_points()
   changed = dealii::Utilities::MPI::max(changed | leaves, grid.communicator());
   // Domains may reach nodes now that they did not reach before.
   if (!changed)
-    changed = reach_changes() || contact.is_outdated() || boundary.cover_changes();
+    changed = reach_changes() || contact.is_outdated() || boundary.cover_changes() || surfaces_change();
   if (changed)
-    prepare();
-  else
-    matrix_is_valid = false;
+    return prepare();
+  for (const auto &body : scene.bodies)
+    form->survey(*body);
+  matrix_is_valid = false;
 }
 
 template class UpSolver<2>;

@@ -6,9 +6,9 @@
 
 #include <sstream>
 
-// The levels of time at which the equations hold: static, those of a diagonally implicit Runge-Kutta method
-// (quasi-static, and the dynamics of material points), and dynamic finite elements (generalised-alpha;
-// theory.md, implicit solvers).
+// Steps: the levels of time at which the equations hold: static, those of a diagonally implicit Runge-Kutta
+// method (quasi-static, and the dynamics of material points), and dynamic finite elements (generalised-alpha;
+// theory.md, implicit solvers); and what goes along with the points after one.
 
 namespace peat {
 namespace {
@@ -98,10 +98,11 @@ void UpSolver<dim>::start(const Mode stage_mode)
   for (const auto &body : scene.bodies)
     form->add_momentum(*body, right_side.block(0));
   right_side.compress(dealii::VectorOperation::add);
-  boundary.constraints().set_zero(right_side);
+  boundary.condense(right_side);
   correction = 0.;
   if (right_side.l2_norm() > 0.)
     linear_solver.solve(correction, right_side);
+  boundary.distribute(correction);
   rate.block(0) = correction.block(0);
   boundary.prescribe_velocity(now, 1e-3 * suggested_step().dt, rate.block(0));
 
@@ -113,6 +114,7 @@ void UpSolver<dim>::start(const Mode stage_mode)
   correction = 0.;
   if (right_side.l2_norm() > 0.)
     linear_solver.solve(correction, right_side);
+  boundary.distribute(correction);
   second.block(0) = correction.block(0);
   if (unknowns.has_pressure())
     rate.block(1) = correction.block(1);
@@ -304,7 +306,7 @@ dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const
     if (mass(index) > 0.)
       velocity(index) /= mass(index);
   velocity.compress(dealii::VectorOperation::insert);
-  boundary.constraints().set_zero(velocity);
+  boundary.distribute(velocity);
   return velocity;
 }
 
@@ -496,6 +498,49 @@ void UpSolver<dim>::reset_displacements()
   total = 0.;
 }
 
+template <int dim>
+void UpSolver<dim>::move_tracers()
+{
+  if (method == Method::finite_elements) {
+    if (!scene.probes)
+      return;
+    ghosted_total = total;
+    scene.probes->place(
+        [&](const dealii::Point<dim> &x) { return unknowns.value(ghosted_total.block(0), x); });
+    return;
+  }
+  // Tracers know vertices only; what lies between is what the points see, too.
+  std::vector<double> step(std::size_t(active.size()) * dim, 0.);
+  for (unsigned int i = 0; i < active.size(); ++i)
+    if (const auto *node = unknowns.node_at(active.grid_node(i)))
+      for (unsigned int d = 0; d < dim; ++d)
+        step[std::size_t(i) * dim + d] = state.unknown.block(0)(node->displacement[d]);
+  for (auto &[name, tracers] : scene.surfaces)
+    tracers.move(step, 1., scene.body(name).material().law().finite_strain(), active);
+  if (scene.probes) {
+    scene.probes->locate(active);
+    scene.probes->move(step, 1., false, active);
+  }
+}
+
+template <int dim>
+bool UpSolver<dim>::surfaces_change()
+{
+  const auto prescribed = [&] {
+    std::vector<dealii::types::global_dof_index> unknowns;
+    for (const auto &line : boundary.constraints().get_lines())
+      unknowns.push_back(line.index);
+    return unknowns;
+  };
+  const auto before = prescribed();
+  for (auto &[name, tracers] : scene.surfaces) {
+    tracers.settle(scene.body(name), active);
+    tracers.locate(active);
+  }
+  boundary.locate(active, small_nodes.unused());
+  return dealii::Utilities::MPI::max(int(prescribed() != before), grid.communicator()) > 0;
+}
+
 #define PEAT_INSTANTIATE(dim)                                                                                \
   template void UpSolver<dim>::set_horizontal_stress(double);                                                \
   template void UpSolver<dim>::reset_displacements();                                                        \
@@ -515,7 +560,9 @@ void UpSolver<dim>::reset_displacements()
                                          const dealii::TrilinosWrappers::MPI::Vector &);                     \
   template double UpSolver<dim>::estimated_error(const BlockVector &);                                       \
   template dealii::TrilinosWrappers::MPI::Vector UpSolver<dim>::mean_velocity() const;                       \
-  template TimeLevel UpSolver<dim>::stage_level(double, bool) const;
+  template TimeLevel UpSolver<dim>::stage_level(double, bool) const;                                         \
+  template void UpSolver<dim>::move_tracers();                                                               \
+  template bool UpSolver<dim>::surfaces_change();
 PEAT_INSTANTIATE(2)
 PEAT_INSTANTIATE(3)
 #undef PEAT_INSTANTIATE

@@ -1,7 +1,7 @@
 // Texts and expressions: values, and what is refused and how.
 
 #define BOOST_TEST_MODULE base
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include "base_scene.h"
 

@@ -1,7 +1,7 @@
 // Parameter files: what is read, what is written, and that the one reproduces the other.
 
 #define BOOST_TEST_MODULE base_files
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include "base_scene.h"
 

@@ -1,7 +1,7 @@
 // Parameter files that are refused: each in one line that names the place and the word.
 
 #define BOOST_TEST_MODULE base_refused
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include "base_scene.h"
 

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE contact_response
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include "output_scene.h"
 

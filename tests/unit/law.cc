@@ -2,7 +2,7 @@
 // input.
 
 #define BOOST_TEST_MODULE law
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include <peat/material/tensor.h>
 

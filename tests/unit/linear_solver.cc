@@ -4,7 +4,7 @@
 #define BOOST_TEST_MODULE linear_solver
 #define BOOST_TEST_NO_MAIN
 #define BOOST_TEST_ALTERNATIVE_INIT_API
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include <peat/base/error.h>
 #include <peat/solver/linear_solver.h>
@@ -126,6 +126,46 @@ BOOST_AUTO_TEST_CASE(three_dimensions)
   check<3>(setting, 50);
   setting.saturated = false;
   check<3>(setting, 50);
+}
+
+/// More unknowns may cost no more than so many iterations more.
+BOOST_AUTO_TEST_CASE(iterations_on_finer_meshes)
+{
+  const auto iterations = [](const PoroelasticCase &setting, const auto &dimension) {
+    unsigned int n;
+    solution_of<dimension.value>(setting, parameters_with(iterative), n);
+    return n;
+  };
+  PoroelasticCase setting;
+  setting.half_load = true;
+  const auto check_growth = [&](const auto &dimension, const unsigned int coarse, const unsigned int fine,
+                                const unsigned int bound, const unsigned int most_more) {
+    setting.n_cells = coarse;
+    const unsigned int few = iterations(setting, dimension);
+    setting.n_cells = fine;
+    const unsigned int many = iterations(setting, dimension);
+    // Aggregates and sweeps of the smoother end at the borders of ranks.
+    const bool parallel = dealii::Utilities::MPI::n_mpi_processes(MPI_COMM_WORLD) > 1;
+    BOOST_TEST(many <= bound + (parallel ? 8 : 0),
+               name(setting) + ": " + std::to_string(many) + " iterations");
+    BOOST_TEST(many <= few + most_more + (parallel ? 3 : 0), name(setting) + ": " + std::to_string(many) +
+                                                                 " iterations, and " + std::to_string(few) +
+                                                                 " on the coarser mesh");
+  };
+  const std::integral_constant<int, 2> plane;
+  const std::integral_constant<int, 3> solid;
+  setting.conductivity = 1e-12;
+  setting.dt = 0.1;
+  check_growth(plane, 32, 64, 30, 4);
+  check_growth(solid, 6, 10, 28, 4);
+  // On coarse meshes inertia alone counts, and there is hardly anything to do.
+  setting.dynamic = setting.seepage_inertia = true;
+  setting.conductivity = 1e-2;
+  setting.dt = 1e-4;
+  check_growth(plane, 64, 96, 25, 4);
+  setting.conductivity = 1e-7;
+  setting.dt = 1e-3;
+  check_growth(plane, 64, 96, 25, 4);
 }
 
 BOOST_AUTO_TEST_CASE(special_boundaries_and_cells)

@@ -1,7 +1,7 @@
 // Materials, dry and saturated: derived numbers, the stable step, ill-posed mixtures, bad input.
 
 #define BOOST_TEST_MODULE material
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include <peat/material/material.h>
 

@@ -2,7 +2,7 @@
 // Also to be run on several ranks.
 
 #define BOOST_TEST_MODULE output
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include "output_scene.h"
 #include "picture_file.h"

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE rigid_body
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include <peat/contact/rigid_body.h>
 #include <peat/contact/shape_moments.h>

@@ -1,7 +1,7 @@
 // What is written about rigid bodies, and how they are refused. Also to be run on several ranks.
 
 #define BOOST_TEST_MODULE rigid_output
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include "output_scene.h"
 #include "picture_file.h"

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE shape
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include <peat/grid/cut_box.h>
 #include <peat/grid/shape.h>

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE stl
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include <peat/contact/shape_moments.h>
 #include <peat/grid/cut_box.h>

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE sweep
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include <peat/simulation/sweep_analysis.h>
 #include <peat/simulation/sweep_plan.h>

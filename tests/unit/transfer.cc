@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE transfer
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include <peat/transfer/weights.h>
 

@@ -1,5 +1,5 @@
 #define BOOST_TEST_MODULE up_form
-#include <boost/test/included/unit_test.hpp>
+#include <boost/test/unit_test.hpp>
 
 #include <peat/material/mixture.h>
 #include <peat/solver/up_form.h>

@@ -18,6 +18,8 @@ std::string shortened(const std::string &text, std::size_t length);
 /// "a, b, c"
 std::string join(const std::vector<std::string> &words);
 
+bool is_one_of(const std::vector<std::string> &words, const std::string &word);
+
 /// The shortest text that reads back as exactly this number: 1e7, 0.25, -3.
 std::string to_text(double number);
 /// The numbers separated by commas.

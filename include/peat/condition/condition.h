@@ -72,6 +72,15 @@ public:
   /// Whether it prescribes this component of the motion on a mesh face. Only one condition may.
   virtual bool prescribes(unsigned int /*boundary*/, unsigned int /*component*/) const { return false; }
 
+  /// Whether this component of the motion is the same at all nodes of its place. No other condition may
+  /// prescribe or tie it at any of them.
+  virtual bool ties(unsigned int /*component*/) const { return false; }
+  /// Make of velocities or accelerations what tied nodes have in common: their mean, weighted by the nodes'
+  /// masses in `fields`, so that momentum stays what it is. Linear. Collective.
+  virtual void tie(const ActiveNodes<dim> &, const NodalFields<dim> & /*fields*/,
+                   std::vector<double> & /*motion*/) const
+  {}
+
   // What an implicit solver asks, which has other nodes than an explicit step. `x` are three coordinates.
 
   /// Displacement [m] in the time from t to t + dt of a component that it prescribes.

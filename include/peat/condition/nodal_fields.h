@@ -15,8 +15,9 @@ struct NodalFields
   double time = 0.; ///< at the start of the step [s]
   double dt = 0.;   ///< [s]
 
-  unsigned int n_sums = 0;           ///< columns of sums
-  std::vector<double> sums;          ///< see Sums
+  unsigned int n_sums = 0;                                                  ///< columns of sums
+  std::vector<double> sums;                                                 ///< see Sums
+  double mass(const std::size_t node) const { return sums[node * n_sums]; } ///< [kg]
   std::vector<double> force;         ///< external forces other than gravity [N], dim columns
   std::vector<double> contact_force; ///< by other bodies [N], dim columns; only with contacts
   std::vector<double> velocity;      ///< at the start of the step [m/s], dim columns

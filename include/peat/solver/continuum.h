@@ -4,6 +4,7 @@
 #include <peat/solver/implicit_pressure.h>
 #include <peat/solver/ledger.h>
 #include <peat/solver/node_extension.h>
+#include <peat/solver/nodal_coupling.h>
 #include <peat/solver/scene.h>
 #include <peat/solver/scheme.h>
 #include <peat/transfer/kernels.h>
@@ -14,7 +15,7 @@ namespace peat {
 ///
 /// Every stage that sums over ranks is collective; all continua of a scene take it one after the other.
 template <int dim>
-class Continuum
+class Continuum : public NodalCoupling
 {
 public:
   /// @param bodies places in scene.bodies
@@ -64,7 +65,11 @@ public:
   /// From now on other things are coupled with the nodes.
   void couple_nodes();
 
-  double mass(const std::size_t node) const { return nodal.sums[node * nodal.n_sums + Sums<dim>::mass]; }
+  /// Whether conditions tie nodes; then it is what restrains them in a PressureSystem.
+  bool ties_nodes() const { return has_ties; }
+  void restrain() override { tie(tried.acceleration); }
+
+  double mass(const std::size_t node) const { return nodal.mass(node); }
   /// The velocity that points deform and move with: new_velocity, or what is mapped back from the points.
   std::vector<double> &carrying_velocity() { return remapped ? mapped_velocity : nodal.new_velocity; }
   bool remaps_velocity() const { return remapped; }
@@ -93,6 +98,8 @@ private:
   /// level of time, and the middle is that of both ends.
   double extrapolation() const { return last_dt > 0. ? 1.5 : 1.; }
   void find_freedom();
+  /// Of accelerations or velocities: what tied nodes have in common. Collective where nodes are tied.
+  void tie(std::vector<double> &motion) const;
   void book_fluid(Ledger<dim> &book) const;
   const Surface<dim> &surface(const Condition<dim> &condition) const;
   Body<dim> &body(const std::size_t member) const { return *scene.bodies[members[member]]; }
@@ -105,6 +112,7 @@ private:
   const bool remapped;
   bool saturated = false;
   bool has_loads = false;
+  bool has_ties = false;
 
   ActiveNodes<dim> active;
   std::vector<std::unique_ptr<Condition<dim>>> conditions; ///< those that concern these bodies

@@ -19,6 +19,8 @@ struct Totals
   dealii::Tensor<1, dim> center; ///< of mass [m]
 
   double energy() const { return kinetic_energy + elastic_energy + fluid_energy; }
+  /// What counts where the equations have no inertia: there velocities carry neither momentum nor energy.
+  Totals without_inertia() const;
 };
 
 /// Collective.
@@ -35,6 +37,9 @@ public:
   /// Collective; `ledger` is this rank's share.
   void update(const Totals<dim> &now, const Ledger<dim> &ledger, MPI_Comm communicator);
 
+  /// From now on the equations have inertia, or not; `now` is what the points hold.
+  void count_inertia(bool inertia, const Totals<dim> &now);
+
   /// Bodies have come in, which changed the totals.
   void admit(const Totals<dim> &before, const Totals<dim> &after);
 
@@ -48,7 +53,11 @@ public:
   double numerical_dissipation = 0.;
 
 private:
+  /// Of what points hold, what the equations of this stage know of.
+  Totals<dim> counted(const Totals<dim> &sums) const { return has_inertia ? sums : sums.without_inertia(); }
+
   Totals<dim> start;
+  bool has_inertia = true;
   Ledger<dim> book;
   double momentum_scale = 0.;
   double energy_scale = 0.;

@@ -36,6 +36,19 @@ public:
   const dealii::AffineConstraints<double> &unused() const { return unused_only; }
   bool prescribes_pressure() const { return any_pressure; }
 
+  // Tied displacements are one unknown, which stands for all of them in the equations.
+  /// By block: the unknowns whose rows this rank may fill.
+  const std::vector<dealii::IndexSet> &relevant() const { return rows; }
+  /// Make a right side of forces on all unknowns: what acts on tied ones acts on the one that stands for
+  /// them, and nothing acts on those that have no equation. Collective.
+  void condense(BlockVector &forces) const;
+  /// Complete a solution or another motion: tied unknowns get what they have in common, others that have no
+  /// equation zero. Collective.
+  void distribute(BlockVector &motion) const;
+  void distribute(dealii::TrilinosWrappers::MPI::Vector &displacement) const;
+  /// Add values at tied displacements to that of the unknown which stands for them. Collective.
+  void gather(dealii::TrilinosWrappers::MPI::Vector &displacement) const;
+
   /// Set the prescribed displacements since `start` and pressures at `end` in a vector of this rank's
   /// unknowns.
   void prescribe(double start, double end, BlockVector &unknown) const;
@@ -68,6 +81,12 @@ private:
     dealii::Point<dim> position;
     const Condition<dim> *condition; ///< nullptr: nothing moves it
   };
+  /// Displacements that are the same.
+  struct Tie
+  {
+    Index common;               ///< stands for all
+    std::vector<Index> members; ///< the others that this rank knows of
+  };
   struct GivenPressure
   {
     Index unknown;
@@ -91,6 +110,8 @@ private:
   };
 
   void find_motions();
+  void find_ties(const std::vector<Index> &unused_unknowns);
+  void make_constraints(const std::vector<Index> &unused_unknowns);
   void find_mesh_pressures();
   void find_pieces(const ActiveNodes<dim> &active);
   void carry(const ActiveNodes<dim> &active, Piece &piece) const;
@@ -113,7 +134,9 @@ private:
   const ImplicitContact<dim> &contact;
   const double penalty;
   dealii::AffineConstraints<double> homogeneous, unused_only;
+  std::vector<dealii::IndexSet> rows;
   std::vector<Motion> motions;
+  std::vector<Tie> ties;
   std::vector<GivenPressure> pressures;
   std::vector<Piece> pieces;
   bool any_pressure = false;

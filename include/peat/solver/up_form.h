@@ -80,6 +80,14 @@ struct VolumetricSplit
   void compress();
 };
 
+/// The unknown in whose equation an unknown of displacement counts: itself, or the one that it is tied to.
+inline dealii::types::global_dof_index equation_of(const dealii::AffineConstraints<double> &constraints,
+                                                   const dealii::types::global_dof_index unknown)
+{
+  const auto *entries = constraints.get_constraint_entries(unknown);
+  return entries && !entries->empty() ? entries->front().first : unknown;
+}
+
 /// What assemble() adds to; null what is not wanted.
 struct UpSystem
 {
@@ -113,6 +121,10 @@ public:
 
   /// Functions psi of a body in a cell; 0 without projection.
   virtual unsigned int n_volumetric() const = 0;
+
+  /// To be called for each body after its points have moved, before its part of the system is added.
+  /// Collective.
+  virtual void survey(const Body<dim> &body) = 0;
 
   /// Add the body's part of the system. Pressures act with their means over cells where the space has no
   /// pressure for a saturated body.

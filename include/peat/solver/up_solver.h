@@ -117,6 +117,8 @@ private:
   /// Over the larger of the scale of the residuals so far and round-off over the tolerance.
   double residual_norm(unsigned int block, double tolerance) const;
   bool converged(double tolerance) const;
+  /// Of both blocks, each over its scale.
+  double residual_size(double tolerance) const;
   void line_search(const TimeLevel &level, double before);
   [[noreturn]] void give_up(unsigned int iterations, double start, double end, double tolerance) const;
   /// What is prescribed, or held by nothing, stands for itself.
@@ -133,6 +135,9 @@ private:
   void book_work(const TimeLevel &level, double share, const dealii::TrilinosWrappers::MPI::Vector &motion);
   void move_tracers();
   void relocate_points();
+  /// Points have moved: put surfaces to where they are now. Whether other unknowns than before are
+  /// prescribed.
+  bool surfaces_change();
   TimeLevel level(double time, double dt) const;
 
   const ImplicitParameters &parameters;
@@ -149,11 +154,11 @@ private:
   SmallNodes<dim> small_nodes;
   ImplicitContact<dim> contact;
   UpBoundary<dim> boundary;
-  LinearSolver linear_solver;
   BlockMatrix matrix;
   dealii::TrilinosWrappers::SparseMatrix pressure_mass;
   std::unique_ptr<VolumetricSplit> split;
   dealii::TrilinosWrappers::MPI::Vector inertia, mass_diagonal;
+  LinearSolver linear_solver; ///< after what its preconditioner refers to, and so destroyed before it
   bool matrix_is_valid = false;
   bool matrix_is_near = false; ///< to the one of `matrix_level` that the linear solver saw last
   TimeLevel matrix_level;

@@ -14,8 +14,8 @@ import numpy as np
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.join(HERE, "exact"))
-import bar_impact, bar_wave, column_selfweight, geostatic, hertz, incline, mandel, patch_rigid, porous_impact, stability
-import strip_box, terzaghi, two_layer, up_column, up_dispersion
+import bar_impact, bar_wave, column_selfweight, geostatic, hertz, incline, large_consolidation, mandel, patch_rigid
+import porous_impact, stability, strip_box, terzaghi, two_layer, up_column, up_dispersion
 
 DATA = os.path.join(HERE, "data")
 UP = ("M", "K", "Q", "alpha", "rho", "rho_f")
@@ -359,6 +359,32 @@ def i2(p):
     write("I2_rigid_on_column", p, columns, np.array(data).T, notes)
 
 
+def l1(p):
+    S, H, q = soil(p), p["H"], p["q"]
+    t_1 = H**2 / (S["K"] * S["M"])
+    T, profile_T = np.r_[np.logspace(-3, np.log10(4), 120)], p["T_profiles"]
+    columns, data, notes = ["T = K M t/H^2 [-]", "t [s]"], [T, T * t_1], derived(S)
+    profile_columns, profiles = [], []
+    for law in ("hencky", "neohooke"):
+        args = (q, H, S["K"], S["M"], law, S["mu"], S["Q"])
+        Z, J, p_cells, s = large_consolidation.solve(T * t_1, *args, n=1200)
+        columns += ["u_%s [m]" % law, "p_base_%s [Pa]" % law]
+        data += [-s, p_cells[:, 0]]
+        final = H * (1 - column_selfweight.stretch(np.array([-q]), law, S["M"], S["mu"])[0])
+        notes.append("final settlement, %s: %.10g m" % (law, final))
+        _, J, p_cells, s = large_consolidation.solve(np.array(profile_T) * t_1, *args, n=1200)
+        every = np.unique(np.r_[np.arange(0, 1200, 8), np.arange(1000, 1200, 4), 1199])
+        for T_i, J_i, p_i, s_i in zip(profile_T, J, p_cells, s):
+            # Places of the cells' centres from their volumes, which the graded mesh gives by its faces.
+            faces = H * np.tanh(4 * np.linspace(0, 1, 1201)) / np.tanh(4)
+            grown = J_i * np.diff(faces)
+            y = np.cumsum(grown) - 0.5 * grown
+            profile_columns += ["y_%s(T=%g) [m]" % (law, T_i), "p_%s(T=%g) [Pa]" % (law, T_i)]
+            profiles += [np.r_[0, y[every], H - s_i], np.r_[p_i[0], p_i[every], 0]]
+    write("L1_finite_strain_s", p, columns, np.array(data).T, notes)
+    write("L1_finite_strain_p", p, profile_columns, np.array(profiles).T, notes)
+
+
 TABLES = {"S1_bar_mode": s1, "S2_bar_step": s2, "S3_gravity_step": s3, "S4_column_selfweight": s4,
           "S5_simple_shear": s5, "P1_terzaghi": p1, "P2_selfweight_consolidation": p2,
           "P3_two_layer": p3, "P4_mandel": p4, "P5_strip_consolidation": p5, "D1_harmonic": d1,
@@ -368,7 +394,8 @@ TABLES = {"S1_bar_mode": s1, "S2_bar_step": s2, "S3_gravity_step": s3, "S4_colum
           "D6_strip_dynamic": d6, "G1_geostatic": g1, "N1_timestep": n1,
           "C1_bars_identical": lambda p: bars("C1_bars_identical", p),
           "C2_bars_unequal": lambda p: bars("C2_bars_unequal", p), "C3_incline": c3, "C4_saturated_slab": c4,
-          "C5_hertz_line": c5, "C6_hertz_sphere_impact": c6, "I1_bar_on_column": i1, "I2_rigid_on_column": i2}
+          "C5_hertz_line": c5, "C6_hertz_sphere_impact": c6, "I1_bar_on_column": i1, "I2_rigid_on_column": i2,
+          "L1_finite_strain": l1}
 
 if __name__ == "__main__":
     with open(os.path.join(DATA, "params.json")) as file:
