@@ -55,6 +55,7 @@ void NodeExtension<dim>::reinit(const ActiveNodes<dim> &nodes, const std::vector
     bool any = false;
     for (unsigned int way = 0; way < 2 * dim; ++way) {
       candidate.behind[way] = candidate.beyond[way] = no_index;
+      candidate.ratio[way] = 1.;
       const double holder = first_rank[i * std::size_t(2 * dim) + way];
       candidate.mine[way] = holder == -rank;
       if (holder == none)
@@ -71,6 +72,10 @@ void NodeExtension<dim>::reinit(const ActiveNodes<dim> &nodes, const std::vector
           break;
         *place = j;
       }
+      if (candidate.beyond[way] != no_index)
+        candidate.ratio[way] =
+            nodes.position(i).distance(nodes.position(candidate.behind[way])) /
+            nodes.position(candidate.behind[way]).distance(nodes.position(candidate.beyond[way]));
       any = any || candidate.behind[way] != no_index;
     }
     if (any)
@@ -78,18 +83,24 @@ void NodeExtension<dim>::reinit(const ActiveNodes<dim> &nodes, const std::vector
   }
   for (auto &level : levels)
     level.clear();
+  n_levels = 0;
 }
 
 template <int dim>
 void NodeExtension<dim>::find(const double *sums, const unsigned int stride, const int resistance)
 {
-  std::vector<Line> found;
+  found.clear();
   const auto value = [&](const std::uint32_t i, const int column) {
     return sums[i * std::size_t(stride) + column];
   };
+  double heaviest_of_all = 0.;
+  for (std::uint32_t i = 0; i < active->size(); ++i)
+    heaviest_of_all = std::max(heaviest_of_all, value(i, 0));
   for (const Candidate &candidate : candidates) {
     const std::uint32_t i = candidate.node;
     const double own = value(i, 0);
+    if (own >= small_share * heaviest_of_all)
+      continue;
     double heaviest = 0.;
     for (const std::uint32_t j : candidate.behind)
       if (j != no_index)
@@ -109,7 +120,7 @@ void NodeExtension<dim>::find(const double *sums, const unsigned int stride, con
       // Heavier than this node, so that none follows itself, and by so much that it stays positive.
       line.slope = 0.;
       if (beyond != no_index)
-        line.slope = std::max(0., std::min({1., given_share * (value(beyond, 0) / own - 1.),
+        line.slope = std::max(0., std::min({candidate.ratio[way], given_share * (value(beyond, 0) / own - 1.),
                                             2. * value(beyond, 0) / heaviest}));
       if (line.slope > 0. && resistance >= 0 && value(i, resistance) > 0.)
         line.slope = std::min(line.slope, given_share * value(beyond, resistance) / value(i, resistance));
@@ -121,34 +132,13 @@ void NodeExtension<dim>::find(const double *sums, const unsigned int stride, con
     }
   }
 
-  std::vector<double> level(active->size(), 0.);
-  for (const Line &line : found)
-    level[line.node[0]] = 1.;
-  active->max_over_ranks(level.data(), 1);
-  for (unsigned int turn = 1; turn <= dim; ++turn) {
-    bool changed = false;
-    std::vector<double> next = level;
-    for (const Line &line : found)
-      for (const std::uint32_t j : {line.node[1], line.node[2]})
-        if (j != no_index && level[j] + 1. > next[line.node[0]]) {
-          next[line.node[0]] = level[j] + 1.;
-          changed = true;
-        }
-    level = next;
-    active->max_over_ranks(level.data(), 1);
-    if (!parallel && !changed)
-      break;
-  }
-  for (auto &lines : levels)
-    lines.clear();
-  for (const Line &line : found)
-    if (level[line.node[0]] <= dim)
-      levels[int(level[line.node[0]]) - 1].push_back(line);
-
+  sort_into_levels(found);
+  if (is_empty())
+    return;
   std::vector<double> mass(active->size());
   for (std::size_t i = 0; i < mass.size(); ++i)
     mass[i] = sums[i * stride];
-  for (unsigned int l = dim; l-- > 0;) {
+  for (unsigned int l = n_levels; l-- > 0;) {
     for (Line &line : levels[l])
       for (unsigned int k = 0; k < 3; ++k)
         line.mass[k] = line.node[k] == no_index ? 0. : mass[line.node[k]];
@@ -159,6 +149,44 @@ void NodeExtension<dim>::find(const double *sums, const unsigned int stride, con
       delta[2] -= line.slope * moved;
     });
   }
+}
+
+template <int dim>
+void NodeExtension<dim>::sort_into_levels(const std::vector<Line> &lines)
+{
+  for (auto &level : levels)
+    level.clear();
+  n_levels = !lines.empty();
+  if (parallel)
+    n_levels = dealii::Utilities::MPI::max(n_levels, active->grid().communicator());
+  if (n_levels == 0)
+    return;
+  std::vector<double> level(active->size(), 0.);
+  for (const Line &line : lines)
+    level[line.node[0]] = 1.;
+  active->max_over_ranks(level.data(), 1);
+  for (unsigned int turn = 1; turn <= dim; ++turn) {
+    bool changed = false;
+    std::vector<double> next = level;
+    for (const Line &line : lines)
+      for (const std::uint32_t j : {line.node[1], line.node[2]})
+        if (j != no_index && level[j] + 1. > next[line.node[0]]) {
+          next[line.node[0]] = level[j] + 1.;
+          changed = true;
+        }
+    level = next;
+    active->max_over_ranks(level.data(), 1);
+    if (!parallel && !changed)
+      break;
+  }
+  // What would follow more nodes in a row than there are directions goes its own way.
+  for (const Line &line : lines)
+    if (const auto l = static_cast<unsigned int>(level[line.node[0]]); l <= dim) {
+      levels[l - 1].push_back(line);
+      n_levels = std::max(n_levels, l);
+    }
+  if (parallel)
+    n_levels = dealii::Utilities::MPI::max(n_levels, active->grid().communicator());
 }
 
 template <int dim>
@@ -192,7 +220,7 @@ template <int dim>
 void NodeExtension<dim>::fold(double *data, const unsigned int stride, const unsigned int first,
                               const unsigned int n) const
 {
-  for (unsigned int l = dim; l-- > 0;)
+  for (unsigned int l = n_levels; l-- > 0;)
     at_level(l, data, stride, first, n, [&](const Line &line, double *delta) {
       const double *own = data + line.node[0] * std::size_t(stride) + first;
       for (unsigned int c = 0; c < n; ++c) {
@@ -208,7 +236,7 @@ template <int dim>
 void NodeExtension<dim>::fold_momentum(double *data, const unsigned int stride,
                                        const unsigned int first) const
 {
-  for (unsigned int l = dim; l-- > 0;)
+  for (unsigned int l = n_levels; l-- > 0;)
     at_level(l, data, stride, first, dim, [&](const Line &line, double *delta) {
       for (unsigned int d = 0; d < dim; ++d) {
         double v[3];
@@ -226,7 +254,7 @@ void NodeExtension<dim>::fold_momentum(double *data, const unsigned int stride,
 template <int dim>
 void NodeExtension<dim>::fold_areas(double *data) const
 {
-  for (unsigned int l = dim; l-- > 0;)
+  for (unsigned int l = n_levels; l-- > 0;)
     at_level(l, data, 1, 0, 1, [&](const Line &line, double *delta) {
       delta[0] -= line.share * data[line.node[0]];
       delta[1] += line.share * data[line.node[0]];
@@ -236,7 +264,7 @@ void NodeExtension<dim>::fold_areas(double *data) const
 template <int dim>
 void NodeExtension<dim>::unfold(double *data, const unsigned int n) const
 {
-  for (unsigned int l = 0; l < dim; ++l)
+  for (unsigned int l = 0; l < n_levels; ++l)
     at_level(l, data, n, 0, n, [&](const Line &line, double *delta) {
       for (unsigned int c = 0; c < n; ++c) {
         const double beyond = line.node[2] == no_index ? 0. : data[line.node[2] * std::size_t(n) + c];
@@ -249,7 +277,7 @@ void NodeExtension<dim>::unfold(double *data, const unsigned int n) const
 template <int dim>
 void NodeExtension<dim>::unfold_compliance(double *data, const unsigned int n) const
 {
-  for (unsigned int l = 0; l < dim; ++l)
+  for (unsigned int l = 0; l < n_levels; ++l)
     at_level(l, data, n, 0, n, [&](const Line &line, double *delta) {
       for (unsigned int c = 0; c < n; ++c) {
         const double own = data[line.node[0] * std::size_t(n) + c];
