@@ -38,9 +38,9 @@ struct SliverFactors
 /// not feel it. So its part of the motion is not a wave, stable to (omega dt)^2 = 4, but a relaxation, stable
 /// to 2, and counts twice.
 ///
-/// Q1: nodes with little mass follow others (NodeExtension), and a body at rest is as fast as its full cells,
-/// wherever its surface lies. While points pass a face they add up to `passing`/n of that, with n of them in
-/// the length of a cell.
+/// Q1: nodes with little mass follow others (NodeExtension). Points that pass a face, and edges and corners
+/// that lie off the lines of the mesh, add up to `passing`/n to the largest squared frequency of full cells,
+/// with n points in the length of a cell.
 template <int dim>
 SliverFactors sliver_factors(const Body<dim> &body, const Slice &slice, const Grid<dim> &grid,
                              const double mach_number)
@@ -63,12 +63,13 @@ SliverFactors sliver_factors(const Body<dim> &body, const Slice &slice, const Gr
   };
   if (layout.wide_domains)
     return reduced(1. / domain, domain < 0.99);
-  // What is evenly filled up to its surface, and stays so for a while, has no more than full cells.
+  // What is full and even, and stays so for a while.
   const double fill = volume / grid.volume(slice.cell);
   double part = 1.;
   for (unsigned int d = 0; d < dim; ++d)
     part = std::min({part, 2. * first_moment[d] / volume, 2. * (1. - first_moment[d] / volume)});
-  if (part > (1. - settled) * fill && fill < 1. + settled && steps_to_renewal * mach_number < 0.5 * settled)
+  if (part > (1. - settled) * fill && std::abs(fill - 1.) < settled &&
+      steps_to_renewal * mach_number < 0.5 * settled)
     return {1., 1., false};
   return reduced(passing * std::pow(largest / grid.volume(slice.cell), 1. / dim), fill < 0.99);
 }
@@ -77,7 +78,6 @@ SliverFactors sliver_factors(const Body<dim> &body, const Slice &slice, const Gr
 struct Speeds
 {
   double wave;      ///< c + |v|, with c undrained in a saturated body
-  double motion;    ///< |v|
   double diffusion; ///< D = Q kappa (1 - r); 0 in a dry body
 };
 
@@ -88,7 +88,7 @@ Speeds speeds(const Body<dim> &body, const Slice &slice, const bool seepage_iner
   const Layout &layout = body.layout();
   const Law &law = body.material().law();
   const Mixture *mixture = body.material().mixture();
-  Speeds fastest{0., 0., 0.};
+  Speeds fastest{0., 0.};
   constexpr unsigned int n_stress = dim == 2 ? 4 : 6;
   for (std::uint32_t begin = slice.begin; begin < slice.end; begin += n_lanes) {
     StressLanes stress = {};
@@ -122,16 +122,30 @@ Speeds speeds(const Body<dim> &body, const Slice &slice, const bool seepage_iner
     const Lanes c = sqrt(modulus / density) + speed;
     for (unsigned int l = 0; l < n_lanes; ++l) {
       fastest.wave = std::max(fastest.wave, c[l]);
-      fastest.motion = std::max(fastest.motion, speed[l]);
       fastest.diffusion = std::max(fastest.diffusion, D[l]);
     }
   }
   return fastest;
 }
 
+/// Of all points [m/s]: what is hit moves as fast at once.
+template <int dim>
+double largest_speed(const std::vector<std::unique_ptr<Body<dim>>> &bodies, const Grid<dim> &grid)
+{
+  double largest = 0.;
+  for (const auto &body : bodies)
+    for (std::uint32_t p = 0; p < body->n_local_points(); ++p) {
+      double v2 = 0.;
+      for (unsigned int d = 0; d < dim; ++d)
+        v2 += std::pow(body->row(p)[body->layout().velocity + d], 2);
+      largest = std::max(largest, v2);
+    }
+  return std::sqrt(dealii::Utilities::MPI::max(largest, grid.communicator()));
+}
+
 template <int dim>
 Limits limits(const Body<dim> &body, const Grid<dim> &grid, const bool seepage_inertia,
-              const bool implicit_pressure)
+              const bool implicit_pressure, const double motion)
 {
   Limits result;
   for (const Slice &slice : body.slices()) {
@@ -139,7 +153,7 @@ Limits limits(const Body<dim> &body, const Grid<dim> &grid, const bool seepage_i
     for (unsigned int d = 0; d < dim; ++d)
       h = std::min(h, grid.size(slice.cell, d));
     const Speeds fastest = speeds(body, slice, seepage_inertia, implicit_pressure);
-    const SliverFactors factors = sliver_factors(body, slice, grid, fastest.motion / fastest.wave);
+    const SliverFactors factors = sliver_factors(body, slice, grid, motion / fastest.wave);
     const double c = fastest.wave / factors.wave;
     const double D = fastest.diffusion / factors.diffusion;
     const double dt = h * h / (D + std::sqrt(D * D + c * c * h * h));
@@ -156,8 +170,9 @@ StableStep stable_step(const std::vector<std::unique_ptr<Body<dim>>> &bodies, co
                        const bool seepage_inertia, const bool implicit_pressure)
 {
   StableStep result{std::numeric_limits<double>::max(), ""};
+  const double motion = largest_speed<dim>(bodies, grid);
   for (const auto &body : bodies) {
-    const Limits mine = limits(*body, grid, seepage_inertia, implicit_pressure);
+    const Limits mine = limits(*body, grid, seepage_inertia, implicit_pressure, motion);
     const double dt = dealii::Utilities::MPI::min(mine.combined, grid.communicator());
     if (!(dt < result.dt))
       continue;
