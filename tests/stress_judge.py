@@ -103,13 +103,13 @@ def energy_gain(table, case):
     the mean of it over the last quarter, which tells energy that comes and goes from energy that grows.
 
     Explicit and semi-implicit velocities stand half a step before positions: what is booked as work lags behind the stored energy
-    by half a step's power of the internal forces. Under the smooth pulse that is known, and taken off."""
+    by half a step's power of the internal forces. That is known, and taken off."""
     energy = [sum(parts) for parts in zip(table["kinetic energy"], table["elastic energy"], table["fluid energy"])]
     scale = max(energy + [abs(w) for w in table["external work"]] + table["seepage dissipation"])
     if not scale > 0.0:
         return 0.0, 0.0
     missing = list(table["numerical dissipation"])
-    if case.scene == "load" and case.settings.get("steps") != "implicit":
+    if case.settings.get("steps") != "implicit":
         stored = [sum(parts) for parts in zip(table["elastic energy"], table["fluid energy"], table["seepage dissipation"])]
         t = table["time"]
         for i in range(1, len(t) - 1):

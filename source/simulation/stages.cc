@@ -306,10 +306,6 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
   mpm.prepare();
   balances->count_inertia(true, totals(scene, communicator));
   begin_stage(stage, mpm.stable_step());
-  if (!scene.contacts.empty() && scene.is_saturated() && stage_scheme.basis == Basis::q1)
-    log.line(
-        "note: 'Basis = q1' is not always stable where saturated bodies are in contact (doc/stability.md); "
-        "prefer 'gimp'");
   ContactEvents<dim> events(log, communicator);
   const double energy_at_start = totals(scene, communicator).energy();
 

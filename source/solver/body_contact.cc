@@ -247,6 +247,19 @@ void BodyContact<dim>::mark_nodes(const Continuum<dim> &continuum, std::vector<c
 }
 
 template <int dim>
+void BodyContact<dim>::note_late_forces()
+{
+  for (const ContactSite<dim> &site : sites)
+    if (site.counts && site.impulse.norm_square() > 0.) {
+      const Vector impulse = this->late_impulse(site);
+      this->push(noted[0], site.first_surface, -impulse);
+      this->push(noted[1], site.second_surface, impulse);
+    }
+  this->give_late_forces(first, noted[0]);
+  this->give_late_forces(second, noted[1]);
+}
+
+template <int dim>
 void BodyContact<dim>::constrain_flux()
 {
   for (const ContactSite<dim> &site : sites)

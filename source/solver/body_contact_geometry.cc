@@ -326,8 +326,15 @@ void BodyContact<dim>::find_surfaces()
         g[side] += volume_gradient[side][s * dim + d] * sites[s].normal[d];
     areas[0][s] = g[0];
     areas[1][s] = -g[1];
-    both_areas[s] = has_mass(sites[s]) ? std::max(0., areas[0][s]) + std::max(0., areas[1][s]) : 0.;
   }
+  // A node that hardly moves points of either body moves neither of the surfaces.
+  for (const Continuum<dim> *small : {&first, &second})
+    if (small->node_extension())
+      for (unsigned int side = 0; side < 2; ++side)
+        over_ranks(areas[side], 1, small == &second,
+                   [&](double *data) { small->node_extension()->fold_areas(data); });
+  for (std::size_t s = 0; s < sites.size(); ++s)
+    both_areas[s] = has_mass(sites[s]) ? std::max(0., areas[0][s]) + std::max(0., areas[1][s]) : 0.;
   lines.find(first.nodes(), &ContactSite<dim>::first, site_of_node, both_areas, sites);
   for (ContactSite<dim> &site : sites)
     if (site.acts) {

@@ -139,6 +139,27 @@ void ContactPair<dim>::give_impulses(Continuum<dim> &continuum, NodalAdditions<d
 }
 
 template <int dim>
+typename ContactPair<dim>::Vector ContactPair<dim>::late_impulse(const ContactSite<dim> &site) const
+{
+  // Ties act through every step as what is within a body does. The flux that a normal impulse drives ends
+  // at an impermeable interface in the same step.
+  if (parameters.law->ties())
+    return Vector();
+  return parameters.interface == ContactParameters<dim>::Interface::impermeable
+             ? site.impulse - (site.impulse * site.normal) * site.normal
+             : site.impulse;
+}
+
+template <int dim>
+void ContactPair<dim>::give_late_forces(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const
+{
+  noted.add_up(parallel, [&](const std::size_t row, const double impulse) {
+    if (continuum.is_saturated())
+      continuum.late_force()[row] += impulse / step_length;
+  });
+}
+
+template <int dim>
 std::pair<double, double> ContactPair<dim>::fluid_force(const Continuum<dim> &continuum,
                                                         const SurfaceNodes &surface, const Vector &n,
                                                         const double area) const

@@ -277,6 +277,19 @@ void ContactSolver<dim>::finish(Ledger<dim> &book)
 }
 
 template <int dim>
+void ContactSolver<dim>::note_late_forces()
+{
+  bool any = false;
+  for (const auto &continuum : *continua)
+    any = any || continuum->has_late_force();
+  if (is_empty() || !any)
+    return;
+  for (const auto &continuum : *continua)
+    std::fill(continuum->late_force().begin(), continuum->late_force().end(), 0.);
+  for_each([](auto &pair) { pair.note_late_forces(); });
+}
+
+template <int dim>
 void ContactSolver<dim>::constrain_flux()
 {
   for_each([](auto &pair) { pair.constrain_flux(); });

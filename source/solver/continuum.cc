@@ -25,6 +25,10 @@ Continuum<dim>::Continuum(const SchemeParameters &scheme, const Grid<dim> &grid,
                                : 0.);
   }
   nodal.n_sums = Sums<dim>::n_columns(saturated);
+  for (const std::size_t b : members)
+    if (const Material &material = scene.bodies[b]->material(); material.mixture())
+      wave_time = std::max(wave_time, grid.smallest_cell_size() /
+                                          material.mixture()->undrained_speed(material.initial_modulus()));
   for (const auto &[name, tracers] : scene.surfaces)
     if (holds_body(name))
       surfaces.push_back(name);
@@ -36,6 +40,8 @@ Continuum<dim>::Continuum(const SchemeParameters &scheme, const Grid<dim> &grid,
         has_ties = has_ties || condition->ties(d);
     }
   has_loads = has_loads || !surfaces.empty();
+  if (scheme.basis == Basis::q1)
+    extension = std::make_unique<NodeExtension<dim>>();
   if (scheme.implicit_pressure && saturated)
     make_implicit_pressure();
 }
@@ -57,7 +63,7 @@ void Continuum<dim>::make_implicit_pressure()
         constrains_flux || condition->fluid() == Fluid::flux || condition->fluid() == Fluid::impermeable;
   }
   pressure = std::make_unique<ImplicitPressure<dim>>(active, tried, alpha, scheme.seepage_inertia,
-                                                     scheme.pressure_stabilisation);
+                                                     scheme.pressure_stabilisation, extension.get());
   first_increment.resize(members.size());
 }
 
@@ -81,149 +87,22 @@ std::vector<CellId> Continuum<dim>::occupied_cells() const
 }
 
 template <int dim>
-void Continuum<dim>::number_nodes(const std::vector<NodeId> &more_nodes)
+double Continuum<dim>::late_share() const
 {
-  active.rebuild(occupied_cells(), more_nodes);
-  resize_fields();
-  steps_to_small_nodes = 0;
-
-  std::vector<bool> open(2 * dim, false);
-  for (const auto &condition : conditions) {
-    condition->select(active);
-    for (const unsigned int boundary : condition->opened_boundaries())
-      open[boundary] = true;
-  }
-  closed_rows.clear();
-  if (saturated)
-    for (unsigned int b = 0; b < 2 * dim; ++b)
-      if (!open[b])
-        for (const std::uint32_t i : active.on_boundary(b))
-          closed_rows.push_back(std::size_t(i) * dim + b / 2);
-  if (!pressure)
-    return;
-  if (has_ties)
-    couple_nodes();
-  std::vector<CellId> cells;
-  for (std::size_t b = 0; b < members.size(); ++b)
-    if (body(b).material().mixture())
-      for (const Slice &slice : body(b).slices())
-        cells.push_back(slice.cell);
-  pressure->renumber(cells);
-  find_prescribed_rows();
-  freedom.moves.assign(prescribed.size(), 1);
-  for (std::size_t row = 0; row < prescribed.size(); ++row)
-    freedom.moves[row] = !prescribed[row];
-  freedom.flows.assign(prescribed.size(), 1);
-  for (const std::size_t row : closed_rows)
-    freedom.flows[row] = 0;
+  // Steps that follow waves are longer than this, those that follow the diffusion of pressure may be a
+  // hundredth of it.
+  constexpr double part_of_wave_time = 0.2;
+  return std::min(1., nodal.dt / (part_of_wave_time * wave_time));
 }
 
 template <int dim>
-void Continuum<dim>::find_prescribed_rows()
+double Continuum<dim>::felt_acceleration(const std::size_t row, const double share) const
 {
-  // What a condition overwrites is prescribed, whatever the value.
-  const double untouched = std::numeric_limits<double>::max();
-  std::vector<double> velocity(active.size() * dim, untouched);
-  for (const auto &condition : conditions)
-    condition->constrain_velocity(active, 0., 1., velocity);
-  prescribed.resize(velocity.size());
-  for (std::size_t row = 0; row < velocity.size(); ++row)
-    prescribed[row] = velocity[row] != untouched;
-  flux_is_given.assign(saturated ? prescribed.size() : 0, 0);
-  if (!saturated)
-    return;
-  for (const std::size_t row : closed_rows)
-    flux_is_given[row] = 1;
-  NodalFields<dim> fields;
-  fields.flux.assign(prescribed.size(), untouched);
-  for (const auto &condition : conditions)
-    condition->constrain_flux(active, {}, fields);
-  for (std::size_t row = 0; row < prescribed.size(); ++row)
-    flux_is_given[row] = flux_is_given[row] || fields.flux[row] != untouched;
-}
-
-template <int dim>
-void Continuum<dim>::resize_fields()
-{
-  const std::size_t n = active.size();
-  nodal.sums.resize(n * nodal.n_sums);
-  for (auto *field : {&nodal.velocity, &nodal.acceleration, &nodal.new_velocity})
-    field->assign(n * dim, 0.);
-  if (remapped)
-    mapped_velocity.assign(n * dim, 0.);
-  if (has_loads)
-    nodal.force.assign(n * dim, 0.);
-  if (saturated) {
-    renumber_flux();
-    nodal.pressure_load.assign(n * dim, 0.);
-  }
-}
-
-template <int dim>
-void Continuum<dim>::renumber_flux()
-{
-  // Steps find the flux anew; this is for pictures between the steps. Another rank may know a node that is
-  // new here: its value comes with a count.
-  constexpr unsigned int n = dim + 1;
-  std::vector<double> known(active.size() * n, 0.);
-  for (std::size_t i = 0; i < active.size(); ++i)
-    if (const std::uint32_t old = active.previous_index(i); old != no_index && !nodal.flux.empty()) {
-      std::copy_n(&nodal.flux[std::size_t(old) * dim], dim, &known[i * n]);
-      known[i * n + dim] = 1.;
-    }
-  active.sum_over_ranks(known.data(), n);
-  nodal.flux.assign(active.size() * dim, 0.);
-  for (std::size_t i = 0; i < active.size(); ++i)
-    for (unsigned int d = 0; d < dim; ++d)
-      nodal.flux[i * dim + d] = known[i * n + d] / std::max(1., known[i * n + dim]);
-}
-
-template <int dim>
-double Continuum<dim>::node_volume(const std::size_t node) const
-{
-  const auto lattice = grid.node_lattice(active.grid_node(node));
-  double volume = 1.;
-  for (unsigned int d = 0; d < dim; ++d) {
-    const auto &planes = grid.planes(d);
-    const int i = lattice[d], last = planes.size() - 1;
-    volume *= 0.5 * (planes[std::min(i + 1, last)] - planes[std::max(i - 1, 0)]);
-  }
-  return volume;
-}
-
-template <int dim>
-void Continuum<dim>::find_small_nodes()
-{
-  if (steps_to_small_nodes-- > 0)
-    return;
-  steps_to_small_nodes = 100;
-  // Mass that a node would have if it were as densely filled as the fullest node of its cells.
-  std::vector<double> full_mass(active.size(), 0.);
-  for (const CellId cell : active.occupied_cells()) {
-    const std::uint32_t *cell_nodes = active.cell_nodes(cell);
-    // By mass per volume of the mesh around a node, so that nodes on the mesh's faces are as heavy as others.
-    double densest = 0.;
-    for (unsigned int v = 0; v < (1u << dim); ++v) {
-      const std::uint32_t i = cell_nodes[active.own_node(v)];
-      densest = std::max(densest, nodal.sums[std::size_t(i) * nodal.n_sums] / node_volume(i));
-    }
-    for (unsigned int i = 0; i < active.nodes_per_cell(); ++i)
-      full_mass[cell_nodes[i]] = std::max(full_mass[cell_nodes[i]], densest * node_volume(cell_nodes[i]));
-  }
-  active.max_over_ranks(full_mass.data(), 1);
-
-  // Of a body that fills its cells a node on a face has half of it, one on an edge or corner an eighth at
-  // least.
-  constexpr double small_share = 0.1;
-  std::vector<char> small(active.size(), 0);
-  for (std::size_t i = 0; i < active.size(); ++i)
-    small[i] = nodal.sums[i * nodal.n_sums + Sums<dim>::mass] < small_share * full_mass[i];
-  near_small_node.assign(active.occupied_cells().size(), 0);
-  for (std::size_t c = 0; c < near_small_node.size(); ++c) {
-    const std::uint32_t *cell_nodes = active.cell_nodes(active.occupied_cells()[c]);
-    for (unsigned int v = 0; v < (1u << dim); ++v)
-      near_small_node[c] |= small[cell_nodes[active.own_node(v)]];
-  }
+  const double m = nodal.mass(row / dim);
+  if (share == 1. || m == 0. || prescribed[row])
+    return nodal.acceleration[row];
+  const double late = late_contact_force[row] / m;
+  return nodal.acceleration[row] - late + share * (late + unfelt_velocity[row] / nodal.dt);
 }
 
 template <int dim>
@@ -244,6 +123,8 @@ void Continuum<dim>::points_to_nodes(const double time, const double dt)
     kernels[b]->scatter(body(b), active, pressure_update(b), nodal.sums.data(), nodal.n_sums, sums);
   }
   active.sum_over_ranks(nodal.sums.data(), nodal.n_sums);
+  if (extension)
+    extend_nodes();
 }
 
 template <int dim>
@@ -282,6 +163,10 @@ void Continuum<dim>::add_loads()
     active.sum_over_ranks(nodal.force.data(), dim);
   if (saturated)
     active.sum_over_ranks(nodal.pressure_load.data(), dim);
+  if (extension && has_loads)
+    extension->fold(nodal.force.data(), dim, 0, dim);
+  if (extension && saturated)
+    extension->fold(nodal.pressure_load.data(), dim, 0, dim);
 
   const double origin[3] = {0., 0., 0.};
   for (unsigned int d = 0; d < dim; ++d)
@@ -364,6 +249,7 @@ void Continuum<dim>::solve_darcy()
     return;
   using S = Sums<dim>;
   const double inertia = scheme.seepage_inertia ? 1. : 0.;
+  const double share = nodal.contact_force.empty() ? 1. : late_share();
   for (std::size_t i = 0; i < active.size(); ++i) {
     const double *sum = &nodal.sums[i * nodal.n_sums];
     const double inverse = sum[S::resistance] > 0. ? 1. / sum[S::resistance] : 0.;
@@ -371,7 +257,7 @@ void Continuum<dim>::solve_darcy()
       const std::size_t row = i * dim + d;
       nodal.flux[row] =
           inverse * (sum[S::pressure_force + d] + nodal.pressure_load[row] +
-                     sum[S::fluid_inertia] * (gravity_now[d] - inertia * nodal.acceleration[row]));
+                     sum[S::fluid_inertia] * (gravity_now[d] - inertia * felt_acceleration(row, share)));
     }
   }
   for (const std::size_t row : closed_rows)
@@ -483,15 +369,25 @@ void Continuum<dim>::advance_points()
   // but the gradient of its velocity would feel them in full, and bring them back to the node.
   if (scheme.affine)
     find_small_nodes();
+  if (!nodal.contact_force.empty() && has_late_force())
+    for (std::size_t row = 0; row < unfelt_velocity.size(); ++row)
+      if (const double m = mass(row / dim); m > 0. && !prescribed[row])
+        unfelt_velocity[row] =
+            (1. - late_share()) * (unfelt_velocity[row] + nodal.dt * late_contact_force[row] / m);
+  if (!nodal.contact_force.empty() && !has_late_force())
+    std::fill(unfelt_velocity.begin(), unfelt_velocity.end(), 0.);
   if (!remapped)
     return;
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
   const char *spin_only = scheme.affine ? near_small_node.data() : nullptr;
   std::fill(mapped_velocity.begin(), mapped_velocity.end(), 0.);
+  const double *a = seen_by_points(nodal.acceleration, seen_acceleration).data();
+  const double *v = seen_by_points(nodal.new_velocity, seen_velocity).data();
   for (std::size_t b = 0; b < members.size(); ++b)
-    kernels[b]->advance_and_remap(body(b), active, nodal.acceleration.data(), nodal.new_velocity.data(),
-                                  spin_only, update, mapped_velocity.data());
+    kernels[b]->advance_and_remap(body(b), active, a, v, spin_only, update, mapped_velocity.data());
   active.sum_over_ranks(mapped_velocity.data(), dim);
+  if (extension)
+    extension->fold_momentum(mapped_velocity.data(), dim, 0);
   for (std::size_t i = 0; i < active.size(); ++i) {
     const double m = mass(i);
     for (unsigned int d = 0; d < dim; ++d)
@@ -507,18 +403,18 @@ void Continuum<dim>::deform_points()
 {
   step_findings = {};
   const VelocityUpdate update{nodal.dt, scheme.retention(nodal.dt)};
-  const double *w = nodal.flux.data();
+  const double *w = seen_by_points(nodal.flux, seen_flux).data();
+  const double *v = seen_by_points(carrying_velocity(), seen_velocity).data();
+  const double *a = remapped ? nullptr : seen_by_points(nodal.acceleration, seen_acceleration).data();
   const char *spin_only = scheme.affine ? near_small_node.data() : nullptr;
   for (std::size_t b = 0; b < members.size(); ++b) {
     PressureUpdate pressures = pressure_update(b);
     if (pressure && body(b).material().mixture())
       pressures.increments = pressure->increments() + first_increment[b];
     if (remapped)
-      kernels[b]->deform(body(b), active, mapped_velocity.data(), w, spin_only, nodal.dt, pressures,
-                         step_findings);
+      kernels[b]->deform(body(b), active, v, w, spin_only, nodal.dt, pressures, step_findings);
     else
-      kernels[b]->advance_and_deform(body(b), active, nodal.acceleration.data(), nodal.new_velocity.data(), w,
-                                     spin_only, update, pressures, step_findings);
+      kernels[b]->advance_and_deform(body(b), active, a, v, w, spin_only, update, pressures, step_findings);
   }
 }
 
@@ -557,7 +453,10 @@ void Continuum<dim>::book_balances(Ledger<dim> &book) const
 template <int dim>
 void Continuum<dim>::move_tracers()
 {
-  const std::vector<double> &velocity = carrying_velocity();
+  const bool extended = extension && !extension->is_empty();
+  const std::vector<double> &velocity = extended ? seen_velocity : carrying_velocity();
+  if (extended && saturated)
+    nodal.flux = seen_flux; // for pictures
   for (const std::string &name : surfaces)
     scene.surfaces.at(name).move(velocity, nodal.dt, scene.body(name).material().law().finite_strain(),
                                  active);

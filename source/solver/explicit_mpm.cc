@@ -89,6 +89,7 @@ void ExplicitMPM<dim>::prepare()
 template <int dim>
 void ExplicitMPM<dim>::find_flux()
 {
+  contact.note_late_forces();
   for (const auto &continuum : continua)
     continuum->solve_darcy();
   contact.constrain_flux();

@@ -48,9 +48,9 @@ inline void damp_alternation(double (&value)[8], const double factor, const doub
 template <int dim>
 ImplicitPressure<dim>::ImplicitPressure(const ActiveNodes<dim> &active, NodalResponse &response,
                                         const double alpha, const bool seepage_inertia,
-                                        const double stabilisation)
+                                        const double stabilisation, const NodeExtension<dim> *const extension)
     : active(active), response(response), alpha(alpha), seepage_inertia(seepage_inertia),
-      stabilisation(stabilisation), communicator(active.grid().communicator())
+      stabilisation(stabilisation), extension(extension), communicator(active.grid().communicator())
 {}
 
 template <int dim>
@@ -174,6 +174,9 @@ void ImplicitPressure<dim>::find_responses(const NodeFreedom<dim> &freedom, cons
   }
   if (!response.conductance.empty())
     response.conductance = conductance;
+  seen_yield = yield;
+  if (extension)
+    extension->unfold_compliance(seen_yield.data(), dim);
 }
 
 template <int dim>
@@ -192,7 +195,7 @@ void ImplicitPressure<dim>::find_mode_responses()
     for (unsigned int d = 0; d < dim; ++d) {
       const double h = spacing[i * dim + d];
       volume *= h;
-      along[d] = 4. * yield[i * dim + d] / (h * h);
+      along[d] = 4. * seen_yield[i * dim + d] / (h * h);
     }
     for (unsigned int m = 0; m < n_modes; ++m)
       for (unsigned int d = 0; d < dim; ++d)
@@ -221,6 +224,10 @@ void ImplicitPressure<dim>::find_right_side(const dealii::Tensor<1, dim> &gravit
                          flow * (std::abs(sum[S::pressure_force + d]) + std::abs(nodal.pressure_load[row]) +
                                  sum[S::fluid_inertia] * std::abs(gravity[d])));
     }
+  }
+  if (extension) {
+    extension->unfold(carry.data(), dim);
+    extension->unfold(gross.data(), dim);
   }
   double sum_of_squares = 0.;
   for (std::size_t k = 0; k < sums.storage.size(); ++k) {
@@ -256,6 +263,8 @@ void ImplicitPressure<dim>::to_nodes(const Vector &pressures)
     }
   }
   active.sum_over_ranks(q.data(), dim);
+  if (extension)
+    extension->fold(q.data(), dim, 0, dim);
 }
 
 template <int dim>
@@ -291,6 +300,8 @@ void ImplicitPressure<dim>::apply(const Vector &pressures, Vector &result)
   } else
     for (std::size_t row = 0; row < q.size(); ++row)
       q[row] = dt * (half * dt * alpha * response.acceleration[row] + response.flux[row]);
+  if (extension)
+    extension->unfold(q.data(), dim);
 
   const std::uint32_t *node = sums.entry_node.data();
   const double *slope = sums.slopes.data();
@@ -354,7 +365,7 @@ void ImplicitPressure<dim>::find_diagonal()
       const std::size_t i = sums.entry_node[e];
       const double *value = &sums.slopes[e * std::size_t(dim)];
       for (unsigned int d = 0; d < dim; ++d)
-        sum += value[d] * value[d] * yield[i * dim + d];
+        sum += value[d] * value[d] * seen_yield[i * dim + d];
       if (!walls.empty() && wall_of_node[i] != no_index)
         for (unsigned int d = 0; d < dim; ++d)
           for (unsigned int c = 0; c < dim; ++c)
@@ -395,7 +406,7 @@ void ImplicitPressure<dim>::make_multigrid()
           double volume = 1.;
           for (unsigned int e = 0; e < dim; ++e)
             volume *= spacing[i * dim + e];
-          coupling += yield[i * dim + d] * volume * volume * filling[i];
+          coupling += seen_yield[i * dim + d] * volume * volume * filling[i];
         }
       const double h = grid.size(cell_of_unknown[k], d);
       coupling *= 2. / n_corners / (h * h);
@@ -491,13 +502,22 @@ template <int dim>
 void ImplicitPressure<dim>::finish(const NodalFields<dim> &nodal)
 {
   outflow = squeezed = 0.;
+  // In the place of what was tried.
+  std::vector<double> &motion = q, &flux = carry;
+  flux = nodal.flux;
+  for (std::size_t row = 0; row < motion.size(); ++row)
+    motion[row] = alpha * (nodal.new_velocity[row] - half * dt * nodal.acceleration[row]);
+  if (extension) {
+    extension->unfold(motion.data(), dim);
+    extension->unfold(flux.data(), dim);
+  }
   for (std::size_t k = 0; k < sums.storage.size(); ++k)
     for (std::uint32_t e = sums.entry_begin[k]; e < sums.entry_begin[k + 1]; ++e)
       for (unsigned int d = 0; d < dim; ++d) {
         const std::size_t row = sums.entry_node[e] * std::size_t(dim) + d;
         const double value = dt * sums.slopes[e * std::size_t(dim) + d];
-        outflow += value * nodal.flux[row];
-        squeezed += value * alpha * (nodal.new_velocity[row] - half * dt * nodal.acceleration[row]);
+        outflow += value * flux[row];
+        squeezed += value * motion[row];
       }
 }
 

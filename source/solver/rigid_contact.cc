@@ -377,6 +377,15 @@ void RigidContact<dim>::mark_nodes(const Continuum<dim> &other, std::vector<char
 }
 
 template <int dim>
+void RigidContact<dim>::note_late_forces()
+{
+  for (const ContactSite<dim> &site : sites)
+    if (site.counts && site.impulse.norm_square() > 0.)
+      this->push(noted, site.second_surface, this->late_impulse(site));
+  this->give_late_forces(continuum, noted);
+}
+
+template <int dim>
 void RigidContact<dim>::constrain_flux()
 {
   for (const ContactSite<dim> &site : sites)

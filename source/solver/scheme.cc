@@ -38,9 +38,7 @@ SchemeParameters::SchemeParameters(Section section)
   section.add("Stress update", update, {"auto", "usl", "musl"},
               "When stresses follow the velocities. 'usl': from the nodes' new velocities, cheapest. 'musl': "
               "from the "
-              "points' new velocities mapped back to the nodes, which 'q1' needs as soon as points leave a "
-              "body's first "
-              "cells. 'auto': usl with gimp, musl with q1.");
+              "points' new velocities mapped back to the nodes. 'auto': usl.");
   section.add("Relaxation time", relaxation_time, nonnegative("s"),
               "Time in which the points' velocities relax to the grid's in 'aflip' and 'flip'; damps noise "
               "at a rate that "
@@ -69,8 +67,7 @@ SchemeParameters::SchemeParameters(Section section)
   basis = basis_name == "q1" ? Basis::q1 : Basis::gimp;
   affine = transfer == "aflip";
   grid_velocity = transfer == "pic";
-  stress_update = update == "usl" || (update == "auto" && basis == Basis::gimp) ? StressUpdate::last
-                                                                                : StressUpdate::modified_last;
+  stress_update = update == "musl" ? StressUpdate::modified_last : StressUpdate::last;
 }
 
 double SchemeParameters::retention(const double dt) const

@@ -14,9 +14,14 @@ struct Limits
   bool small_piece = false;
 };
 
-/// Material that only just reaches into a cell counts as at least this share of its volume: its stay there is
-/// short, and a step that follows its distance from the face to zero would stop the run.
-constexpr double least_part = 0.25;
+/// Steps until this limit is looked for again.
+constexpr double steps_to_renewal = 100.;
+/// How far from their even places the points of a cell count as on their way out [cell sizes, from end to
+/// end].
+constexpr double settled = 0.05;
+/// What points that pass a face of cells add to the largest squared frequency, over that of full cells: from
+/// the spectra of columns with one to five points in a cell, 0.25 to 0.56.
+constexpr double passing = 0.56;
 
 /// Factors by which slivers of material, which a node may have to move alone, reduce the limits of full
 /// cells.
@@ -30,35 +35,43 @@ struct SliverFactors
 /// GIMP: a domain of half-length l that reaches over the surface's grid line adds up to c^2/(l h) to the
 /// largest squared frequency 4 c^2/h^2, whatever the length that sticks out, and likewise D/(l h) to the
 /// largest rate 4 D/h^2. The velocity of a node with hardly any mass does not outlive the step: its points do
-/// not feel it. So its part of the motion is not a wave, stable to (omega dt)^2 = 4, but a relaxation, stable to
-/// 2, and counts twice. Q1: fitted to the spectral radius of columns whose last cell is filled in part; of a cell
-/// that is filled in part counts what its material weighs at the nodes with the least of it.
+/// not feel it. So its part of the motion is not a wave, stable to (omega dt)^2 = 4, but a relaxation, stable
+/// to 2, and counts twice.
+///
+/// Q1: nodes with little mass follow others (NodeExtension). Points that pass a face, and edges and corners
+/// that lie off the lines of the mesh, add up to `passing`/n to the largest squared frequency of full cells,
+/// with n points in the length of a cell.
 template <int dim>
-SliverFactors sliver_factors(const Body<dim> &body, const Slice &slice, const Grid<dim> &grid)
+SliverFactors sliver_factors(const Body<dim> &body, const Slice &slice, const Grid<dim> &grid,
+                             const double mach_number)
 {
   const Layout &layout = body.layout();
-  double volume = 0., domain = 1.;
+  double volume = 0., domain = 1., largest = 0.;
   dealii::Tensor<1, dim> first_moment; // of volume, about the lower corner of the cell, in its edges
   for (std::uint32_t i = slice.begin; i < slice.end; ++i) {
     const double *row = body.row(body.handles()[i]);
     volume += row[layout.volume];
+    largest = std::max(largest, row[layout.volume]);
     const auto &x = body.position(body.handles()[i]);
     for (unsigned int d = 0; d < dim; ++d)
       first_moment[d] += row[layout.volume] * (x[d] - grid.lower(slice.cell, d)) / grid.size(slice.cell, d);
     for (unsigned int d = 0; d < dim && layout.wide_domains; ++d)
       domain = std::min(domain, 4. * row[layout.extent + d] / grid.size(slice.cell, d));
   }
+  const auto reduced = [](const double part, const bool small) {
+    return SliverFactors{1. / std::sqrt(1. + 2. * part), 1. / (1. + part), small};
+  };
   if (layout.wide_domains)
-    return {1. / std::sqrt(1. + 2. / domain), 1. / (1. + 1. / domain), domain < 0.99};
+    return reduced(1. / domain, domain < 0.99);
+  // What is full and even, and stays so for a while.
   const double fill = volume / grid.volume(slice.cell);
-  if (fill > 0.99)
-    return {1., 1., false};
-  // The mass that a node moves is that of the material times its mean distance from the opposite face.
-  double part = fill;
+  double part = 1.;
   for (unsigned int d = 0; d < dim; ++d)
     part = std::min({part, 2. * first_moment[d] / volume, 2. * (1. - first_moment[d] / volume)});
-  part = std::max(part, least_part * fill);
-  return {std::min(1., 1.39 * std::sqrt(part)), std::min(1., 1.95 * part), true};
+  if (part > (1. - settled) * fill && std::abs(fill - 1.) < settled &&
+      steps_to_renewal * mach_number < 0.5 * settled)
+    return {1., 1., false};
+  return reduced(passing * std::pow(largest / grid.volume(slice.cell), 1. / dim), fill < 0.99);
 }
 
 /// Stiffness and density at the fastest of a cell's points.
@@ -115,17 +128,32 @@ Speeds speeds(const Body<dim> &body, const Slice &slice, const bool seepage_iner
   return fastest;
 }
 
+/// Of all points [m/s]: what is hit moves as fast at once.
+template <int dim>
+double largest_speed(const std::vector<std::unique_ptr<Body<dim>>> &bodies, const Grid<dim> &grid)
+{
+  double largest = 0.;
+  for (const auto &body : bodies)
+    for (std::uint32_t p = 0; p < body->n_local_points(); ++p) {
+      double v2 = 0.;
+      for (unsigned int d = 0; d < dim; ++d)
+        v2 += std::pow(body->row(p)[body->layout().velocity + d], 2);
+      largest = std::max(largest, v2);
+    }
+  return std::sqrt(dealii::Utilities::MPI::max(largest, grid.communicator()));
+}
+
 template <int dim>
 Limits limits(const Body<dim> &body, const Grid<dim> &grid, const bool seepage_inertia,
-              const bool implicit_pressure)
+              const bool implicit_pressure, const double motion)
 {
   Limits result;
   for (const Slice &slice : body.slices()) {
     double h = std::numeric_limits<double>::max();
     for (unsigned int d = 0; d < dim; ++d)
       h = std::min(h, grid.size(slice.cell, d));
-    const SliverFactors factors = sliver_factors(body, slice, grid);
     const Speeds fastest = speeds(body, slice, seepage_inertia, implicit_pressure);
+    const SliverFactors factors = sliver_factors(body, slice, grid, motion / fastest.wave);
     const double c = fastest.wave / factors.wave;
     const double D = fastest.diffusion / factors.diffusion;
     const double dt = h * h / (D + std::sqrt(D * D + c * c * h * h));
@@ -142,8 +170,9 @@ StableStep stable_step(const std::vector<std::unique_ptr<Body<dim>>> &bodies, co
                        const bool seepage_inertia, const bool implicit_pressure)
 {
   StableStep result{std::numeric_limits<double>::max(), ""};
+  const double motion = largest_speed<dim>(bodies, grid);
   for (const auto &body : bodies) {
-    const Limits mine = limits(*body, grid, seepage_inertia, implicit_pressure);
+    const Limits mine = limits(*body, grid, seepage_inertia, implicit_pressure, motion);
     const double dt = dealii::Utilities::MPI::min(mine.combined, grid.communicator());
     if (!(dt < result.dt))
       continue;

@@ -49,6 +49,8 @@ public:
   virtual void finish(Ledger<dim> &book) = 0;
   /// Nodes that more than one contact acts on need several sweeps; whether this one acts on the node.
   virtual void mark_nodes(const Continuum<dim> &continuum, std::vector<char> &count) const = 0;
+  /// Add to the continua's late_force() (theory.md, contact).
+  virtual void note_late_forces() = 0;
   /// No flow through an impermeable interface, the given pressure at a drained one.
   virtual void constrain_flux() = 0;
   /// No approach of re-mapped velocities where there is contact.
@@ -87,6 +89,9 @@ protected:
   /// Note an impulse of this step on a surface; give_impulses() hands what was noted to the nodes.
   void push(NodalAdditions<dim> &noted, const SurfaceNodes &surface, const Vector &impulse) const;
   void give_impulses(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
+  /// Of the site's impulse what drives the flux in the mean over steps only.
+  Vector late_impulse(const ContactSite<dim> &site) const;
+  void give_late_forces(Continuum<dim> &continuum, NodalAdditions<dim> &noted) const;
   /// The force of the pore fluid on an interface with normal n out of the continuum: with the impulses that
   /// the nodes have had [N], and what a further impulse along -n adds to it [1/s] (theory.md, contact).
   std::pair<double, double> fluid_force(const Continuum<dim> &continuum, const SurfaceNodes &surface,

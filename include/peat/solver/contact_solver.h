@@ -26,6 +26,8 @@ public:
   void begin(double time, double dt);
   /// Correct new velocities and accelerations, and the rigid bodies' motion.
   void solve();
+  /// Of the impulses found, to the continua; before these find the flux.
+  void note_late_forces();
   void constrain_flux();
   /// Move the rigid bodies, sum up.
   void finish(Ledger<dim> &book);

@@ -4,6 +4,7 @@
 #include <peat/solver/implicit_pressure.h>
 #include <peat/solver/ledger.h>
 #include <peat/solver/nodal_coupling.h>
+#include <peat/solver/node_extension.h>
 #include <peat/solver/scene.h>
 #include <peat/solver/scheme.h>
 #include <peat/transfer/kernels.h>
@@ -59,8 +60,15 @@ public:
   /// What a change of pressures that is tried does to the nodes; empty where it concerns these alone.
   NodalResponse &response() { return tried; }
   const NodalResponse &response() const { return tried; }
+  /// Nullptr with shape functions that have no small nodes of large effect.
+  const NodeExtension<dim> *node_extension() const { return extension.get(); }
   /// From now on other things are coupled with the nodes.
   void couple_nodes();
+  /// Of the contact force what drives the flux in the mean over steps only, by node and component [N]
+  /// (theory.md, contact). To be filled before solve_darcy().
+  std::vector<double> &late_force() { return late_contact_force; }
+  /// Whether steps are so short that it makes a difference.
+  bool has_late_force() const { return saturated && scheme.seepage_inertia && late_share() < 1.; }
 
   /// Whether conditions tie nodes; then it is what restrains them in a PressureSystem.
   bool ties_nodes() const { return has_ties; }
@@ -79,7 +87,16 @@ public:
 
 private:
   void resize_fields();
-  void renumber_flux();
+  /// Of a field with dim columns keep what nodes had that are still there.
+  void renumber(std::vector<double> &field) const;
+  /// Of late forces, and of what the flux has not felt yet, the share that it feels in this step.
+  double late_share() const;
+  /// The acceleration that drives the flux.
+  double felt_acceleration(std::size_t row, double share) const;
+  void extend_nodes();
+  /// The field as points see it; a copy in `seen` where that differs from what the nodes have.
+  const std::vector<double> &seen_by_points(const std::vector<double> &field,
+                                            std::vector<double> &seen) const;
   void find_small_nodes();
   /// Half of the cells of the mesh on either side, in every direction [m^dim].
   double node_volume(std::size_t node) const;
@@ -113,6 +130,11 @@ private:
   std::vector<double> filter_rates; ///< of the pressure filter, by member [1/s]
   NodalFields<dim> nodal;
   std::vector<double> mapped_velocity;
+  std::unique_ptr<NodeExtension<dim>> extension;
+  /// What points see of the nodes' motion where there is an extension.
+  std::vector<double> seen_acceleration, seen_velocity, seen_flux;
+  std::vector<double> late_contact_force, unfelt_velocity; ///< the latter by the former [m/s]
+  double wave_time = 0.; ///< of an undrained wave across the smallest cell [s]
   /// Cells that have a node of little mass, by ActiveNodes::occupied_index().
   std::vector<char> near_small_node;
   unsigned int steps_to_small_nodes = 0;

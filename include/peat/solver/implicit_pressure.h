@@ -2,6 +2,7 @@
 
 #include <peat/condition/nodal_fields.h>
 #include <peat/solver/nodal_coupling.h>
+#include <peat/solver/node_extension.h>
 #include <peat/transfer/kernels.h>
 
 #include <deal.II/base/tensor.h>
@@ -49,8 +50,9 @@ public:
 
   /// @param response of the continuum's nodes; empty: nodes are not coupled with others
   /// @param stabilisation factor on the term that acts on alternating pressures
+  /// @param extension of small nodes, or nullptr
   ImplicitPressure(const ActiveNodes<dim> &active, NodalResponse &response, double alpha,
-                   bool seepage_inertia, double stabilisation);
+                   bool seepage_inertia, double stabilisation, const NodeExtension<dim> *extension);
 
   /// Number the unknowns, one for each of these cells, in the order of the sums.
   void renumber(const std::vector<CellId> &cells);
@@ -115,6 +117,7 @@ private:
   const double alpha;
   const bool seepage_inertia;
   const double stabilisation;
+  const NodeExtension<dim> *const extension;
   MPI_Comm communicator;
 
   std::vector<CellId> cell_of_unknown;
@@ -143,6 +146,7 @@ private:
   std::vector<double> mobility;      ///< of the acceleration: weight alpha / m
   std::vector<double> conductance;   ///< of the flux
   std::vector<double> yield;         ///< G of nodes that are not coupled
+  std::vector<double> seen_yield;    ///< about what points see of it
   std::vector<double> mode_response; ///< of alternating pressures, n_modes columns
   std::vector<std::pair<std::uint32_t, dealii::Tensor<2, dim>>> walls; ///< conductances there
   std::vector<double> q, carry, gross;

@@ -30,6 +30,7 @@ public:
   void take_reactions() override;
   void finish(Ledger<dim> &book) override;
   void mark_nodes(const Continuum<dim> &continuum, std::vector<char> &count) const override;
+  void note_late_forces() override;
   void constrain_flux() override;
   void constrain_carrying_velocity() override;
 
