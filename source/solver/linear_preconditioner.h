@@ -31,8 +31,11 @@ public:
   explicit DirectFactor(std::string purpose) : purpose(std::move(purpose)) {}
   void build(const LinearSolver::BlockMatrix &matrix, const PreconditionerData &data) override;
   void vmult(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const override;
+  /// The values that the factors are made of; reading makes them, in the pattern of `matrix`. Collective.
+  void persist(Archive &archive, const LinearSolver::BlockMatrix &matrix);
 
 private:
+  void factorise();
   void make_pattern(const LinearSolver::BlockMatrix &matrix);
   void copy_values(const LinearSolver::BlockMatrix &matrix);
   void complain() const;

@@ -94,6 +94,25 @@ void LinearSolver::prepare(const BlockMatrix &new_matrix, const PreconditionerDa
   find_scaling();
 }
 
+void LinearSolver::persist(Archive &archive, const BlockMatrix &pattern)
+{
+  archive.begin("linear solver");
+  auto *factor = dynamic_cast<DirectFactor *>(preconditioner.get());
+  bool has_factor = factor != nullptr;
+  if (!archive.is_loading() && !has_factor)
+    is_worn = true;
+  archive & has_factor & is_worn & fresh_iterations & n_builds;
+  if (!has_factor)
+    return;
+  if (archive.is_loading()) {
+    auto made = std::make_unique<DirectFactor>(purpose);
+    factor = made.get();
+    preconditioner = std::move(made);
+    direct = true;
+  }
+  factor->persist(archive, pattern);
+}
+
 void LinearSolver::build()
 {
   preconditioner->build(*matrix, data);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <peat/base/archive.h>
 #include <peat/base/parameters.h>
 
 #include <deal.II/base/point.h>
@@ -113,6 +114,12 @@ public:
   /// Solve from the initial guess in `solution`; returns the number of iterations. Throws a NumericalError on
   /// every rank if the tolerance is not reached. Collective.
   unsigned int solve(BlockVector &solution, const BlockVector &rhs);
+
+  /// The factors that the next prepare() may keep, by the matrix that they were made of; reading makes them
+  /// again. `matrix` has the pattern of theirs. What is preconditioned by multigrid instead refers to matrices
+  /// that have changed since: writing sees to it that the next prepare() makes it anew, as it is after
+  /// reading. Collective.
+  void persist(Archive &archive, const BlockMatrix &matrix);
 
   bool is_direct() const { return direct; }
   /// Whether a system of so many unknowns will be solved directly: what only a preconditioner needs then need

@@ -32,6 +32,7 @@ public:
   void mark_nodes(const Continuum<dim> &continuum, std::vector<char> &count) const override;
   void constrain_flux() override;
   void constrain_carrying_velocity() override;
+  void persist(Archive &archive) override;
 
 private:
   using Vector = typename ContactPair<dim>::Vector;
