@@ -31,7 +31,7 @@ void Archive::take(std::string &text, int)
 void Archive::begin(const std::string &name)
 {
   std::string found = name;
-  *this & found;
+  take(found, 0);
   if (found != name)
     throw InputError("the checkpoint was written by another program: '" + found + "' stands where '" + name +
                      "' is expected");

@@ -58,7 +58,8 @@ void write_entry(std::ostream &out, const SectionNode &node, const Declared &ent
   if (entry.kind != "constant")
     write_comment(out, indent, comment(entry));
   // Where presence has a meaning, and where there is no value, the line is only shown.
-  out << indent << (is_absent(node, entry) || !entry.value.has_value() ? "# " : "") << "set " << entry.key << " =";
+  out << indent << (is_absent(node, entry) || !entry.value.has_value() ? "# " : "") << "set " << entry.key
+      << " =";
   if (entry.value.has_value() && !entry.value->empty())
     out << ' ' << *entry.value;
   out << '\n';

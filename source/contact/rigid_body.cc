@@ -436,7 +436,7 @@ template <int dim>
 void RigidBody<dim>::persist(Archive &archive)
 {
   archive.begin("rigid body " + name());
-  archive & center_now & turned & angle & center_velocity & spin_now & last_force & last_moment;
+  archive(center_now, turned, angle, center_velocity, spin_now, last_force, last_moment);
 }
 
 template class RigidBody<2>;

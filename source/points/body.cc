@@ -363,12 +363,12 @@ void Body<dim>::persist(Archive &archive)
 {
   archive.begin("body " + name());
   std::uint64_t n = n_local_points();
-  archive & initial_number & n;
+  archive(initial_number, n);
   // Where the particle handler has a point is where the last synchronise() put it, and decides how the next
   // one orders the storage.
   const auto one_point = [&](CellId handler_cell, dealii::types::particle_index id, CellId cell,
                              dealii::Point<dim> x, double *row, const auto &take) {
-    archive & handler_cell & id & cell & x;
+    archive(handler_cell, id, cell, x);
     archive.bytes(row, columns.n_columns * sizeof(double));
     take(handler_cell, id, cell, x);
   };

@@ -204,7 +204,8 @@ void CheckpointWriter::remove_others(const std::vector<std::string> &names) cons
   std::error_code error;
   std::vector<fs::path> others;
   for (const auto &entry : fs::directory_iterator(directory, error))
-    if (const std::string name = entry.path().filename().string(); name != index_name && !is_one_of(names, name))
+    if (const std::string name = entry.path().filename().string();
+        name != index_name && !is_one_of(names, name))
       others.push_back(entry.path());
   for (const fs::path &other : others)
     fs::remove(other, error);
@@ -308,10 +309,9 @@ void Checkpoint::compare_parameters(const std::vector<ParameterValue> &before, c
       return true;
     // Numbers that are made of constants are compared themselves.
     if (entry.is_constant)
-      return std::none_of(now.begin(), now.end(),
-                          [&](const ParameterValue &other) {
-                            return !is_of_no_account(other) && other.mentions(entry.key);
-                          });
+      return std::none_of(now.begin(), now.end(), [&](const ParameterValue &other) {
+        return !is_of_no_account(other) && other.mentions(entry.key);
+      });
     const std::size_t stage = stage_of_duration(entry, stages);
     if (!is_output_interval(entry) && (stage == stages.size() || stage < when.stage))
       return false;
@@ -322,8 +322,9 @@ void Checkpoint::compare_parameters(const std::vector<ParameterValue> &before, c
     const auto old = find(before, entry);
     const std::string old_value = old == before.end() ? "(not set)" : old->value;
     if (entry.value != old_value && !may_differ(entry))
-      refuse(file, entry, "is " + in_quotes(entry.value) + ", but " + in_quotes(old_value) +
-                              " in the run that is to be resumed");
+      refuse(file, entry,
+             "is " + in_quotes(entry.value) + ", but " + in_quotes(old_value) +
+                 " in the run that is to be resumed");
   }
   for (const ParameterValue &entry : before)
     if (find(now, entry) == now.end() && entry.value != "(not set)" && !may_differ(entry))
@@ -341,14 +342,17 @@ void Checkpoint::compare_parameters(const std::vector<ParameterValue> &before, c
   const auto old_names = names(before);
   for (const auto &[section, list] : names(now))
     if (const auto old = old_names.find(section); old != old_names.end() && old->second != list)
-      file.root().subsection(section).fail("", "names " + in_quotes(list) + ", but " + in_quotes(old->second) +
+      file.root().subsection(section).fail("", "names " + in_quotes(list) + ", but " +
+                                                   in_quotes(old->second) +
                                                    " in the run that is to be resumed");
 
   double end = 0.;
   for (std::size_t s = 0; s <= when.stage && s < stages.size(); ++s)
     end += stages[s].duration;
   if (other_times && end < when.time)
-    file.root().subsection("Stages").subsection(stages[when.stage].name)
+    file.root()
+        .subsection("Stages")
+        .subsection(stages[when.stage].name)
         .fail("Duration", "ends before " + to_text(when.time) + " s, the time of the checkpoint");
 }
 

@@ -358,7 +358,7 @@ void Comparison<dim>::persist(Archive &archive)
 {
   archive.begin("comparison");
   for (Reference &reference : references)
-    archive & reference.done & reference.samples & reference.n_outside;
+    archive(reference.done, reference.samples, reference.n_outside);
 }
 
 template class Comparison<2>;

@@ -38,12 +38,13 @@ void GrowingFile::persist(Archive &archive)
     file.flush();
     length = std::filesystem::file_size(name, error);
   }
-  archive & length;
+  archive(length);
   if (!archive.is_loading() || !is_open() || length == 0)
     return;
   const std::uintmax_t present = std::filesystem::file_size(name, error);
   if (error || present < length)
-    throw InputError("'" + name + "' is shorter than when the checkpoint was written; the run cannot go on with it");
+    throw InputError("'" + name +
+                     "' is shorter than when the checkpoint was written; the run cannot go on with it");
   open_at(length);
 }
 } // namespace peat

@@ -51,11 +51,11 @@ struct Simulation<dim>::Outputs
   void persist(Archive &archive)
   {
     archive.begin("outputs");
-    archive & statistics & line_step & picture_step;
+    archive(statistics, line_step, picture_step);
     if (probes)
-      archive &*probes;
+      archive(*probes);
     if (pictures)
-      archive &*pictures;
+      archive(*pictures);
   }
 
   /// When something is next due.

@@ -333,7 +333,7 @@ template <int dim>
 void Pictures<dim>::persist(Archive &archive)
 {
   archive.begin("pictures");
-  archive & n_times & parts & entries;
+  archive(n_times, parts, entries);
   if (archive.is_loading() && dealii::Utilities::MPI::this_mpi_process(communicator) == 0)
     write_list();
 }

@@ -13,11 +13,11 @@ void Simulation<dim>::heed(const Watch::Call call)
   // What a recorder has seen is not kept.
   if (call == Watch::Call::none || recorder)
     return;
-  const std::string problem = checkpoints.write({progress.stage, now, steps.n_steps},
-                                                [this](Archive &archive) {
-                                                  persist_record(archive);
-                                                  persist_state(archive);
-                                                });
+  const std::string problem =
+      checkpoints.write({progress.stage, now, steps.n_steps}, [this](Archive &archive) {
+        persist_record(archive);
+        persist_state(archive);
+      });
   if (!problem.empty())
     log.line("attention: no checkpoint was written at t = " + to_text(now) + " s: " + problem);
   else if (stopped)
@@ -63,7 +63,7 @@ void Simulation<dim>::persist_record(Archive &archive)
 {
   archive.begin("run");
   WallTimes before = wall;
-  archive & progress & now & steps & pressure_work & schemes & before & log &*outputs & comparison;
+  archive(progress, now, steps, pressure_work, schemes, before, log, *outputs, comparison);
   if (!archive.is_loading())
     return;
   wall.setup += before.setup;
@@ -84,7 +84,7 @@ void Simulation<dim>::persist_state(Archive &archive)
       make_explicit_solver(stage, start);
     events = std::make_unique<ContactEvents<dim>>(log, communicator);
   }
-  archive & scene &*solver &*balances &*events;
+  archive(scene, *solver, *balances, *events);
 }
 
 #define PEAT_INSTANTIATE(dim)                                                                                \

@@ -53,13 +53,13 @@ std::string output_directory(const RunOptions &options)
 
 void StepRecord::persist(Archive &archive)
 {
-  archive & n_steps & smallest & largest & total_time & limit;
+  archive(n_steps, smallest, largest, total_time, limit);
 }
 
 void StageProgress::persist(Archive &archive)
 {
-  archive & stage & scheme & largest_step & stable.dt & stable.limit & steps_since_check & dt & steps_left &
-      reaches_event & energy_at_start;
+  archive(stage, scheme, largest_step, stable.dt, stable.limit, steps_since_check, dt, steps_left,
+          reaches_event, energy_at_start);
 }
 
 void StepRecord::add(const double dt)
@@ -72,8 +72,7 @@ void StepRecord::add(const double dt)
 
 template <int dim>
 Simulation<dim>::Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options,
-                            MPI_Comm communicator, Recorder<dim> *recorder,
-                            std::unique_ptr<Checkpoint> begun)
+                            MPI_Comm communicator, Recorder<dim> *recorder, std::unique_ptr<Checkpoint> begun)
     : begin(seconds()), parameters(parameters), options(options), communicator(communicator),
       grid(parameters.grid, communicator), scene(make_scene(parameters, grid)),
       comparison(parameters, std::filesystem::path(options.file).parent_path().string()), recorder(recorder),
@@ -143,8 +142,8 @@ void Simulation<dim>::report(const double time, const bool everything)
     outputs->probes->write(time);
     comparison.compare(*outputs->probes);
   }
-  if (outputs->pictures && (outputs->picture_times.due(time) ||
-                            (everything && outputs->picture_step != steps.n_steps))) {
+  if (outputs->pictures &&
+      (outputs->picture_times.due(time) || (everything && outputs->picture_step != steps.n_steps))) {
     outputs->picture_step = steps.n_steps;
     outputs->pictures->write(time, solver->nodes(), solver->fields());
   }

@@ -136,6 +136,7 @@ void Simulation<dim>::construct_up_solver(const typename UpSolver<dim>::Method m
                                               parameters.displacement_nodes(),
                                               parameters.scheme.seepage_inertia, grid, scene, start, carried);
   up_solver = made.get();
+  explicit_solver = nullptr;
   solver = std::move(made);
 }
 

@@ -80,11 +80,11 @@ void Statistics<dim>::write_header()
 {
   std::ostream &out = file.lines();
   out << "time [s],step,dt [s],binding limit,mass [kg],kinetic energy [J],elastic energy [J],fluid energy "
-          "[J],"
-          "external work [J],gravity work [J],seepage dissipation [J],contact dissipation [J],numerical "
-          "dissipation [J],fluid "
-          "outflow [m^"
-       << dim << "],largest speed [m/s]";
+         "[J],"
+         "external work [J],gravity work [J],seepage dissipation [J],contact dissipation [J],numerical "
+         "dissipation [J],fluid "
+         "outflow [m^"
+      << dim << "],largest speed [m/s]";
   const char axes[] = "xyz";
   for (const std::string quantity : {"momentum", "impulse", "center"})
     for (unsigned int d = 0; d < dim; ++d)
@@ -112,10 +112,10 @@ void Statistics<dim>::write(const double time, const unsigned long step, const d
   std::ostream &out = file.lines();
   out.precision(15);
   out << time << ',' << step << ',' << dt << ',' << limit << ',' << totals.mass << ','
-       << totals.kinetic_energy << ',' << totals.elastic_energy << ',' << totals.fluid_energy << ','
-       << book.external_work << ',' << book.gravity_work << ',' << book.seepage_dissipation << ','
-       << book.contact_dissipation << ',' << balances.numerical_dissipation << ',' << book.fluid_outflow
-       << ',' << totals.largest_speed;
+      << totals.kinetic_energy << ',' << totals.elastic_energy << ',' << totals.fluid_energy << ','
+      << book.external_work << ',' << book.gravity_work << ',' << book.seepage_dissipation << ','
+      << book.contact_dissipation << ',' << balances.numerical_dissipation << ',' << book.fluid_outflow << ','
+      << totals.largest_speed;
   for (const auto &vector : {totals.momentum, book.impulse, totals.center})
     for (unsigned int d = 0; d < dim; ++d)
       out << ',' << vector[d];

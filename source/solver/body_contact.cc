@@ -280,7 +280,7 @@ template <int dim>
 void BodyContact<dim>::persist(Archive &archive)
 {
   archive.begin("contact of bodies");
-  archive & planes;
+  archive(planes);
 }
 
 template class BodyContact<2>;

@@ -571,9 +571,9 @@ template <int dim>
 void Continuum<dim>::persist(Archive &archive)
 {
   archive.begin("continuum");
-  archive & nodal.time & nodal.dt & nodal.contact_force & near_small_node & steps_to_small_nodes;
+  archive(nodal.time, nodal.dt, nodal.contact_force, near_small_node, steps_to_small_nodes);
   if (pressure)
-    archive &*pressure;
+    archive(*pressure);
 }
 
 template class Continuum<2>;

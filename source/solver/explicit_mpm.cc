@@ -266,10 +266,10 @@ void ExplicitMPM<dim>::persist(Archive &archive)
   if (archive.is_loading())
     prepare();
   archive.begin("explicit steps");
-  archive & now & book;
+  archive(now, book);
   for (const auto &continuum : continua)
-    archive &*continuum;
-  archive & contact & pressures;
+    archive(*continuum);
+  archive(contact, pressures);
 }
 
 template class ExplicitMPM<2>;

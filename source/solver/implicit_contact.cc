@@ -94,13 +94,13 @@ void ImplicitContact<dim>::persist(Archive &archive)
 {
   archive.begin("implicit contact");
   bool entered = !movers.empty();
-  archive & entered;
+  archive(entered);
   if (!entered)
     return;
   if (archive.is_loading())
     make_movers();
   for (const auto &mover : movers)
-    archive & mover->moved & mover->scale;
+    archive(mover->moved, mover->scale);
 }
 
 template <int dim>

@@ -541,7 +541,7 @@ void ImplicitPressure<dim>::persist(Archive &archive)
 {
   archive.begin("implicit pressure");
   bool has_multigrid = multigrid != nullptr;
-  archive & outflow & squeezed & wants_multigrid & fresh_iterations & multigrids_made & has_multigrid;
+  archive(outflow, squeezed, wants_multigrid, fresh_iterations, multigrids_made, has_multigrid);
   if (!has_multigrid)
     return;
   if (archive.is_loading())

@@ -94,23 +94,17 @@ void LinearSolver::prepare(const BlockMatrix &new_matrix, const PreconditionerDa
   find_scaling();
 }
 
-void LinearSolver::persist(Archive &archive, const BlockMatrix &pattern)
+void LinearSolver::persist(Archive &archive, const BlockMatrix &pattern, const bool keeps)
 {
   archive.begin("linear solver");
-  auto *factor = dynamic_cast<DirectFactor *>(preconditioner.get());
-  bool has_factor = factor != nullptr;
-  if (!archive.is_loading() && !has_factor)
-    is_worn = true;
-  archive & has_factor & is_worn & fresh_iterations & n_builds;
-  if (!has_factor)
-    return;
-  if (archive.is_loading()) {
-    auto made = std::make_unique<DirectFactor>(purpose);
-    factor = made.get();
-    preconditioner = std::move(made);
-    direct = true;
+  if (keeps) {
+    if (archive.is_loading() && would_be_direct(pattern.m())) {
+      preconditioner = std::make_unique<DirectFactor>(purpose);
+      direct = true;
+    }
+    preconditioner->persist(archive, pattern);
   }
-  factor->persist(archive, pattern);
+  archive(is_worn, fresh_iterations, n_builds);
 }
 
 void LinearSolver::build()

@@ -20,14 +20,21 @@ inline void persist_values(Archive &archive, dealii::TrilinosWrappers::MPI::Bloc
     persist_values(archive, vector.block(b));
 }
 
-inline void persist_values(Archive &archive, const Epetra_CrsMatrix &matrix)
+/// Call an action with the values of each of this rank's rows and their number.
+template <typename Action>
+void for_each_row(const Epetra_CrsMatrix &matrix, const Action &action)
 {
   for (int row = 0; row < matrix.NumMyRows(); ++row) {
     int length, *columns;
     double *values;
     matrix.ExtractMyRowView(row, length, values, columns);
-    archive.bytes(values, length * sizeof(double));
+    action(values, length);
   }
+}
+
+inline void persist_values(Archive &archive, const Epetra_CrsMatrix &matrix)
+{
+  for_each_row(matrix, [&](double *values, const int n) { archive.bytes(values, n * sizeof(double)); });
 }
 
 inline void persist_values(Archive &archive, dealii::TrilinosWrappers::SparseMatrix &matrix)

@@ -58,7 +58,7 @@ void RigidSites<dim>::persist(Archive &archive, const ActiveNodes<dim> &nodes)
   std::vector<std::uint32_t> chosen;
   for (const ContactSite<dim> &site : sites)
     chosen.push_back(site.second);
-  archive & chosen & corners_of_choice;
+  archive(chosen, corners_of_choice);
   if (archive.is_loading())
     take(nodes, chosen);
 }

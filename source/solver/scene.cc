@@ -38,14 +38,14 @@ void Scene<dim>::persist(Archive &archive)
 {
   archive.begin("scene");
   for (const auto &body : bodies)
-    archive &*body;
+    archive(*body);
   for (auto &[name, tracers] : surfaces)
-    archive & tracers;
+    archive(tracers);
   if (probes)
-    archive &*probes;
+    archive(*probes);
   for (const auto &rigid : rigid_bodies)
-    archive &*rigid;
-  archive & contact_states;
+    archive(*rigid);
+  archive(contact_states);
 }
 
 template <int dim>

@@ -7,7 +7,7 @@ template <int dim>
 void UpSolver<dim>::persist(Archive &archive)
 {
   archive.begin("implicit steps");
-  archive & contact;
+  archive(contact);
   if (archive.is_loading()) {
     // As prepare(), but surfaces have settled already, and the sites of contact are those of the last choice.
     number_unknowns();
@@ -20,8 +20,8 @@ void UpSolver<dim>::persist(Archive &archive)
   if (archive.is_loading())
     resize();
 
-  archive & now & mode & damped_steps_left & next_step & first_step_done & change_scale & residual_scale &
-      fluid_scale_before & nodal.time & nodal.dt & book & done;
+  archive(now, mode, damped_steps_left, next_step, first_step_done, change_scale, residual_scale,
+          fluid_scale_before, nodal.time, nodal.dt, book, done);
   for (BlockVector *vector : {&rate, &second, &total, &change})
     persist_values(archive, *vector);
   persist_values(archive, mass_diagonal);
@@ -30,13 +30,17 @@ void UpSolver<dim>::persist(Archive &archive)
     state.moved = moved;
   }
 
-  // The matrix itself is assembled again. Where it still serves it is that of a linear problem, and depends on
-  // its level alone; the vectors of a step do not matter to it.
-  bool serves = matrix_is_valid;
-  archive & serves & matrix_is_near & matrix_level;
-  linear_solver.persist(archive, matrix);
-  if (archive.is_loading() && serves)
+  // Where the matrix still serves it is that of a linear problem, which depends on its level alone, and so
+  // does its preconditioner: both are made again. Else the next step assembles another, but it may keep the
+  // preconditioner; multigrid is then made of values of today first, for its patterns.
+  bool serves = matrix_is_valid, is_near = matrix_is_near;
+  archive(serves, is_near, matrix_level);
+  const bool keeps = is_near && !serves;
+  if (archive.is_loading() && (serves || (keeps && !linear_solver.would_be_direct(unknowns.n_unknowns()))))
     assemble(matrix_level, true);
+  linear_solver.persist(archive, matrix, keeps);
+  matrix_is_valid = serves;
+  matrix_is_near = is_near;
 }
 
 template void UpSolver<2>::persist(Archive &);

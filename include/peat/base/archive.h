@@ -15,7 +15,7 @@ namespace peat {
 ///   void Thing::persist(Archive &archive)
 ///   {
 ///     archive.begin("thing");
-///     archive & count & values & parts;
+///     archive(count, values, parts);
 ///   }
 ///
 /// Numbers, enumerations and trivially copyable structures (without pointers) go as they are in memory, so
@@ -32,11 +32,10 @@ public:
   /// What follows belongs to `name`. Throws an InputError if something else was written here.
   void begin(const std::string &name);
 
-  template <typename Value>
-  Archive &operator&(Value &value)
+  template <typename... Values>
+  void operator()(Values &...values)
   {
-    take(value, 0);
-    return *this;
+    (take(values, 0), ...);
   }
 
   /// Throws an InputError at the end of what there is.
@@ -68,13 +67,13 @@ private:
       bytes(list.data(), n * sizeof(Value));
     else
       for (Value &value : list)
-        *this & value;
+        take(value, 0);
   }
   template <typename Value, std::size_t n>
   void take(std::array<Value, n> &list, int)
   {
     for (Value &value : list)
-      *this & value;
+      take(value, 0);
   }
   template <typename Key, typename Value>
   void take(std::map<Key, Value> &map, int)
@@ -85,13 +84,14 @@ private:
       map.clear();
       for (std::uint64_t i = 0; i < n; ++i) {
         Key key;
-        *this & key;
-        *this & map[key];
+        take(key, 0);
+        take(map[key], 0);
       }
     } else
       for (auto &[name, value] : map) {
         Key key = name;
-        *this & key & value;
+        take(key, 0);
+        take(value, 0);
       }
   }
 

@@ -69,7 +69,7 @@ public:
   void persist(Archive &archive)
   {
     archive.begin("tracers");
-    archive & list;
+    archive(list);
   }
 
 private:

@@ -29,8 +29,8 @@ struct CheckpointMoment
 
 /// Writes checkpoints of a run to `checkpoint/` in its directory: one file for each rank with the state, and
 /// `index.json`, which names them with their checksums, and the parameters of the run. The index is replaced
-/// when the files are complete, and then those of the checkpoint before go: whatever happens in between, there
-/// is a whole one.
+/// when the files are complete, and then those of the checkpoint before go: whatever happens in between,
+/// there is a whole one.
 class CheckpointWriter
 {
 public:
@@ -58,10 +58,10 @@ class Checkpoint
 {
 public:
   /// Throws an InputError on all ranks if there is none, if it is damaged, or if it is of another version, of
-  /// another number of ranks or of other parameters. What may differ: intervals of output, and the durations of
-  /// the present stage, which must not have ended by then, and later ones. Collective.
-  Checkpoint(const std::string &run_directory, const ParameterFile &file, const std::vector<StageSpan> &stages,
-             MPI_Comm communicator);
+  /// another number of ranks or of other parameters. What may differ: intervals of output, and the durations
+  /// of the present stage, which must not have ended by then, and later ones. Collective.
+  Checkpoint(const std::string &run_directory, const ParameterFile &file,
+             const std::vector<StageSpan> &stages, MPI_Comm communicator);
 
   const CheckpointMoment &moment() const { return when; }
   /// Whether outputs or the end of a stage are at other times than they were to be.

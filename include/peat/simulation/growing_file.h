@@ -7,8 +7,8 @@
 #include <string>
 
 namespace peat {
-/// A text file to which a run adds lines. A new run begins it anew with its first line; one that goes on from a
-/// checkpoint cuts off what was written after that.
+/// A text file to which a run adds lines. A new run begins it anew with its first line; one that goes on from
+/// a checkpoint cuts off what was written after that.
 class GrowingFile
 {
 public:

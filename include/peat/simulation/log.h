@@ -23,7 +23,7 @@ public:
   /// The same with a text of one's own; on a terminal only.
   void status(const std::string &text);
 
-  void persist(Archive &archive) { archive & file; }
+  void persist(Archive &archive) { archive(file); }
 
 private:
   void end_progress();

@@ -36,7 +36,7 @@ private:
     unsigned int part;
     std::string name;
     std::string file;
-    void persist(Archive &archive) { archive & time & part & name & file; }
+    void persist(Archive &archive) { archive(time, part, name, file); }
   };
 
   void write_grid(double time, const ActiveNodes<dim> &nodes, const NodalFields<dim> &fields);
@@ -57,7 +57,7 @@ private:
   {
     std::string file_name;
     unsigned int number;
-    void persist(Archive &archive) { archive & file_name & number; }
+    void persist(Archive &archive) { archive(file_name, number); }
   };
   std::map<std::string, Part> parts;
   std::vector<Entry> entries;

@@ -35,7 +35,7 @@ public:
   /// Of the last write(), the same on all ranks; NaN where there is no material or no such field.
   double value(const std::string &probe, const std::string &field) const;
   double time() const { return last_time; }
-  void persist(Archive &archive) { archive & file & last_time & values; }
+  void persist(Archive &archive) { archive(file, last_time, values); }
 
 private:
   struct Probe

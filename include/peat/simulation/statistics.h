@@ -16,7 +16,7 @@ public:
 
   void write(double time, unsigned long step, double dt, const std::string &limit, const Totals<dim> &totals,
              const Balances<dim> &balances);
-  void persist(Archive &archive) { archive & file; }
+  void persist(Archive &archive) { archive(file); }
 
 private:
   void write_header();

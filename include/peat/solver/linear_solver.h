@@ -115,11 +115,11 @@ public:
   /// every rank if the tolerance is not reached. Collective.
   unsigned int solve(BlockVector &solution, const BlockVector &rhs);
 
-  /// The factors that the next prepare() may keep, by the matrix that they were made of; reading makes them
-  /// again. `matrix` has the pattern of theirs. What is preconditioned by multigrid instead refers to matrices
-  /// that have changed since: writing sees to it that the next prepare() makes it anew, as it is after
-  /// reading. Collective.
-  void persist(Archive &archive, const BlockMatrix &matrix);
+  /// What the next prepare() goes by. With `keeps`, that may be the preconditioner, which is written as what
+  /// it was made of, and made of that again: factors in the pattern of `matrix`; multigrid in place of one
+  /// that prepare() has made of other values, which leaves in `matrix` and data what it was made of.
+  /// Collective.
+  void persist(Archive &archive, const BlockMatrix &matrix, bool keeps);
 
   bool is_direct() const { return direct; }
   /// Whether a system of so many unknowns will be solved directly: what only a preconditioner needs then need
