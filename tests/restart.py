@@ -282,7 +282,7 @@ def refused(c):
     attempt("another parameter", "Materials/soil/linear elastic/Poisson ratio: is '0.2', but '0.3'",
             {"Materials/soil/linear elastic/Poisson ratio": 0.2})
     attempt("another constant", "Materials/soil/Hydraulic conductivity: is '0.001'", {"Constants/k": 1e-3})
-    attempt("an end that has passed", "Stages/impact/Duration: ends before", {"Constants/After": 1e-4})
+    attempt("an end that has passed", "Stages/impact/Duration: ends before", {"Constants/After": 1e-7})
     attempt("a longer stage, other intervals", None,
             {"Constants/After": 0.03, "Output/Statistics interval": 1e-3, "Output/Checkpoint interval": 1})
     c.note("    goes to the new end", scene_tools.Run(directory, 0, "").summary["simulated_time"] == 0.03, "")

@@ -144,7 +144,9 @@ void Multigrid::make(const TrilinosMatrix &matrix, const unsigned int n_componen
 void Multigrid::persist(Archive &archive, TrilinosMatrix &matrix, const unsigned int n_components)
 {
   archive(factor);
-  persist_values(archive, matrix);
+  if (archive.is_loading())
+    amg.clear(); // goes before its matrix
+  persist_rows(archive, matrix);
   if (archive.is_loading())
     make(matrix, n_components);
 }

@@ -41,4 +41,31 @@ inline void persist_values(Archive &archive, dealii::TrilinosWrappers::SparseMat
 {
   persist_values(archive, matrix.trilinos_matrix());
 }
+
+/// This rank's rows of a matrix whose pattern depends on values, as that of a product of others does. When
+/// reading it is distributed already.
+inline void persist_rows(Archive &archive, dealii::TrilinosWrappers::SparseMatrix &matrix)
+{
+  const Epetra_CrsMatrix &before = matrix.trilinos_matrix();
+  std::vector<int> lengths, numbers;
+  std::vector<double> entries;
+  for (int row = 0; row < before.NumMyRows() && !archive.is_loading(); ++row) {
+    int length, *columns;
+    double *values;
+    before.ExtractMyRowView(row, length, values, columns);
+    lengths.push_back(length);
+    for (int k = 0; k < length; ++k)
+      numbers.push_back(before.GCID(columns[k]));
+    entries.insert(entries.end(), values, values + length);
+  }
+  archive(lengths, numbers, entries);
+  if (!archive.is_loading())
+    return;
+  Epetra_CrsMatrix read(Copy, before.RowMap(), lengths.data(), true);
+  std::size_t next = 0;
+  for (int row = 0; row < before.NumMyRows(); next += lengths[row++])
+    read.InsertGlobalValues(before.GRID(row), lengths[row], &entries[next], &numbers[next]);
+  read.FillComplete(before.DomainMap(), before.RangeMap());
+  matrix.reinit(read);
+}
 } // namespace peat
