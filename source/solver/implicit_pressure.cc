@@ -5,6 +5,7 @@
 
 #include <Teuchos_ParameterList.hpp>
 #include <ml_MultiLevelPreconditioner.h>
+#include <ml_utils.h>
 
 #include <algorithm>
 #include <cmath>
@@ -438,6 +439,7 @@ void ImplicitPressure<dim>::make_multigrid()
   list.set("coarse: type", "Amesos-KLU");
   list.set("coarse: max size", 1000);
   multigrid = std::make_unique<dealii::TrilinosWrappers::PreconditionAMG>();
+  ML_set_random_seed(multigrid_seed);
   multigrid->initialize(star, list);
 }
 

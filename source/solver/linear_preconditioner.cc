@@ -9,6 +9,7 @@
 #include <Epetra_Import.h>
 #include <Teuchos_ParameterList.hpp>
 #include <ml_MultiLevelPreconditioner.h>
+#include <ml_utils.h>
 
 #include <algorithm>
 #include <cmath>
@@ -138,6 +139,7 @@ void Multigrid::make(const TrilinosMatrix &matrix, const unsigned int n_componen
 {
   Teuchos::ParameterList list = multigrid_settings();
   list.set("PDE equations", int(n_components));
+  ML_set_random_seed(multigrid_seed);
   amg.initialize(matrix, list);
 }
 
@@ -239,6 +241,7 @@ void Multigrid::build(const TrilinosMatrix &matrix, const std::vector<double> &m
     for (unsigned int d = 0; d < dim; ++d)
       list.set(names[d], pointer(places[d]));
   }
+  ML_set_random_seed(multigrid_seed);
   amg.initialize(matrix, list);
 }
 

@@ -8,6 +8,10 @@
 #include <Epetra_CrsMatrix.h>
 
 namespace peat {
+/// ML estimates eigenvalues from random vectors, of one sequence in a process: before it makes a hierarchy
+/// this begins anew, so that one of the same matrix is the same in a run that goes on from a checkpoint.
+constexpr int multigrid_seed = 1;
+
 /// This rank's values of a vector or matrix, which when reading has its size or pattern already.
 inline void persist_values(Archive &archive, dealii::TrilinosWrappers::MPI::Vector &vector)
 {
