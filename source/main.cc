@@ -19,6 +19,7 @@ const char *const usage =
     R"(PEAT: Poromechanics with Elements And maTerial points
 
   peat run CASE.prm           run a case (also: peat CASE.prm; mpirun -np N peat run CASE.prm)
+  peat run CASE.prm --resume  go on with a run that was ended by a signal, or that wrote checkpoints
   peat compare CASE.prm       run it with two methods or settings and report where the results differ
   peat sweep CASE.prm         run it with all combinations of some settings: error against run time
   peat check CASE.prm         validate a case and say what it would take; runs nothing
@@ -43,6 +44,8 @@ bool parse(const int argc, char **argv, const bool first_rank, CommandLine &line
                         options::value(&line.run.overrides)->composing()->value_name("\"Section/Key=value\""),
                         "override an entry of the file; repeatable")(
       "output", options::value(&line.run.output)->value_name("DIR"), "directory for results (output/CASE)")(
+      "resume", options::bool_switch(&line.run.resume),
+      "of 'peat run': go on from the checkpoint in the directory for results")(
       "quiet", options::bool_switch(&line.run.quiet), "say nothing on the terminal but errors")(
       "vary", options::value(&line.sweep.vary)->composing()->value_name("\"Section/Key=a,b\""),
       "of 'peat sweep': values of an entry; repeatable, all combinations are run")(
@@ -86,6 +89,8 @@ bool parse(const int argc, char **argv, const bool first_rank, CommandLine &line
   for (const char *option : {"vary", "target", "jobs"})
     if (values.count(option) && line.command != "sweep")
       throw InputError("'--" + std::string(option) + "' is for 'peat sweep'");
+  if (line.run.resume && line.command != "run")
+    throw InputError("'--resume' is for 'peat run'");
   if (values.count("target") && !(line.sweep.target > 0. && std::isfinite(line.sweep.target)))
     throw InputError("'--target' must be a relative error > 0");
   if (values.count("jobs") && (line.sweep.n_jobs < 1 || line.sweep.n_jobs > 1000))

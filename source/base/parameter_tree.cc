@@ -83,7 +83,8 @@ bool is_identifier(const std::string &name)
          std::all_of(name.begin(), name.end(), is_name_character);
 }
 
-/// Whether the name stands in the expression as a word of its own.
+} // namespace
+
 bool mentions(const std::string &expression, const std::string &name)
 {
   for (std::size_t i = expression.find(name); i != std::string::npos; i = expression.find(name, i + 1)) {
@@ -95,6 +96,7 @@ bool mentions(const std::string &expression, const std::string &name)
   return false;
 }
 
+namespace {
 double value_of_constant(const PrmEntry &entry, const Constants &earlier, const std::vector<PrmEntry> &all)
 {
   const std::string place = "Constants/" + shortened(entry.key, 60) + ": ";

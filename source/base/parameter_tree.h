@@ -60,6 +60,9 @@ struct SectionNode
   std::set<std::string> presence_asked;
 };
 
+/// Whether the name stands in the expression as a word of its own.
+bool mentions(const std::string &expression, const std::string &name);
+
 class ParameterTree
 {
 public:

@@ -47,13 +47,19 @@ std::string comment(const Declared &entry)
   return text + ", default " + (entry.fallback->empty() ? "empty" : *entry.fallback);
 }
 
+/// Presence has a meaning, and the file does not set it.
+bool is_absent(const SectionNode &node, const Declared &entry)
+{
+  return node.given(entry.key) == nullptr && node.presence_asked.count(entry.key) > 0;
+}
+
 void write_entry(std::ostream &out, const SectionNode &node, const Declared &entry, const std::string &indent)
 {
   if (entry.kind != "constant")
     write_comment(out, indent, comment(entry));
   // Where presence has a meaning, and where there is no value, the line is only shown.
-  const bool is_absent = node.given(entry.key) == nullptr && node.presence_asked.count(entry.key) > 0;
-  out << indent << (is_absent || !entry.value.has_value() ? "# " : "") << "set " << entry.key << " =";
+  out << indent << (is_absent(node, entry) || !entry.value.has_value() ? "# " : "") << "set " << entry.key
+      << " =";
   if (entry.value.has_value() && !entry.value->empty())
     out << ' ' << *entry.value;
   out << '\n';
@@ -91,6 +97,27 @@ void write_section(std::ostream &out, const SectionNode &node, const std::string
       write_section(out, *child, start + "  ");
       out << start << "end\n";
     }
+}
+
+void collect(const SectionNode &node, const std::vector<std::string> &sections,
+             std::vector<ParameterValue> &values)
+{
+  for (const Declared &entry : node.declared) {
+    ParameterValue value;
+    value.sections = sections;
+    value.key = entry.key;
+    value.value = entry.value.value_or("");
+    value.is_expression = entry.kind == "function" || entry.kind == "text";
+    value.is_constant = entry.kind == "constant";
+    if (is_absent(node, entry))
+      value.value = "(not set)";
+    values.push_back(value);
+  }
+  for (const auto &child : node.children) {
+    std::vector<std::string> below = sections;
+    below.push_back(child->name);
+    collect(*child, below, values);
+  }
 }
 
 // --- The reference
@@ -186,6 +213,26 @@ void write_json_section(std::ostream &out, const SectionNode &node, bool &is_fir
 void ParameterFile::write_prm(std::ostream &out) const
 {
   write_section(out, tree->root, "");
+}
+
+std::vector<ParameterValue> ParameterFile::values() const
+{
+  std::vector<ParameterValue> values;
+  collect(tree->root, {}, values);
+  return values;
+}
+
+std::string ParameterValue::path() const
+{
+  std::string path;
+  for (const std::string &section : sections)
+    path += section + "/";
+  return path + key;
+}
+
+bool ParameterValue::mentions(const std::string &name) const
+{
+  return is_expression && internal::mentions(value, name);
 }
 
 void ParameterFile::write_markdown(std::ostream &out) const

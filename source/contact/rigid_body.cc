@@ -433,40 +433,10 @@ void RigidBody<dim>::turn_freely(const double dt)
 }
 
 template <int dim>
-std::vector<double> RigidBody<dim>::state() const
+void RigidBody<dim>::persist(Archive &archive)
 {
-  std::vector<double> values;
-  for (unsigned int d = 0; d < dim; ++d)
-    values.push_back(center_now[d]);
-  for (unsigned int d = 0; d < dim; ++d)
-    for (unsigned int e = 0; e < dim; ++e)
-      values.push_back(turned[d][e]);
-  const Generalised now = motion();
-  for (unsigned int c = 0; c < n_motions; ++c)
-    values.push_back(now[c]);
-  for (unsigned int r = 0; r < n_rotations; ++r)
-    values.push_back(angle[r]);
-  return values;
-}
-
-template <int dim>
-void RigidBody<dim>::set_state(const std::vector<double> &values)
-{
-  if (values.size() != state().size())
-    throw InputError("the state of rigid body '" + name() + "' has " + std::to_string(state().size()) +
-                     " numbers, not " + std::to_string(values.size()));
-  auto next = values.begin();
-  for (unsigned int d = 0; d < dim; ++d)
-    center_now[d] = *next++;
-  for (unsigned int d = 0; d < dim; ++d)
-    for (unsigned int e = 0; e < dim; ++e)
-      turned[d][e] = *next++;
-  for (unsigned int d = 0; d < dim; ++d)
-    center_velocity[d] = *next++;
-  for (unsigned int r = 0; r < n_rotations; ++r)
-    spin_now[r] = *next++;
-  for (unsigned int r = 0; r < n_rotations; ++r)
-    angle[r] = *next++;
+  archive.begin("rigid body " + name());
+  archive(center_now, turned, angle, center_velocity, spin_now, last_force, last_moment);
 }
 
 template class RigidBody<2>;

@@ -358,6 +358,50 @@ void Body<dim>::synchronise(const double time)
   }
 }
 
+template <int dim>
+void Body<dim>::persist(Archive &archive)
+{
+  archive.begin("body " + name());
+  std::uint64_t n = n_local_points();
+  archive(initial_number, n);
+  // Where the particle handler has a point is where the last synchronise() put it, and decides how the next
+  // one orders the storage.
+  const auto one_point = [&](CellId handler_cell, dealii::types::particle_index id, CellId cell,
+                             dealii::Point<dim> x, double *row, const auto &take) {
+    archive(handler_cell, id, cell, x);
+    archive.bytes(row, columns.n_columns * sizeof(double));
+    take(handler_cell, id, cell, x);
+  };
+  if (!archive.is_loading()) {
+    for (const auto &particle : particles) {
+      const std::uint32_t handle = particle.get_local_index();
+      one_point(particle.get_surrounding_cell()->active_cell_index(), id(handle), cell_of_point[handle],
+                position(handle), row(handle), [](auto &&...) {});
+    }
+    return;
+  }
+  std::vector<typename dealii::Triangulation<dim>::active_cell_iterator> iterators(grid.n_local_cells());
+  for (const auto &cell : grid.triangulation().active_cell_iterators())
+    iterators[cell->active_cell_index()] = cell;
+  particles.clear_particles();
+  particles.get_property_pool().reserve(n);
+  std::vector<CellId> cells(n);
+  std::vector<double> row(columns.n_columns);
+  for (std::uint64_t p = 0; p < n; ++p)
+    one_point(0, 0, 0, {}, row.data(),
+              [&](const CellId handler_cell, const auto id, const CellId cell, const auto &x) {
+                const auto &place = iterators[handler_cell];
+                particles.insert_particle(x, grid.mapping().transform_real_to_unit_cell(place, x), id, place,
+                                          row);
+                cells[p] = cell;
+              });
+  particles.update_cached_numbers();
+  moved_points.clear();
+  attach_storage();
+  cell_of_point.swap(cells);
+  rebuild_slices();
+}
+
 template struct BodyParameters<2>;
 template struct BodyParameters<3>;
 template class Body<2>;

@@ -16,8 +16,15 @@ template <int dim>
 int run(const ParameterFile &file, const RunOptions &options, MPI_Comm communicator)
 {
   Case<dim> parameters(file);
+  std::unique_ptr<Checkpoint> checkpoint;
+  if (options.resume) {
+    std::vector<StageSpan> stages;
+    for (const StageParameters &stage : parameters.stages)
+      stages.push_back({stage.name, stage.duration});
+    checkpoint = std::make_unique<Checkpoint>(output_directory(options), file, stages, communicator);
+  }
   catch_signals();
-  Simulation<dim> simulation(parameters, file, options, communicator);
+  Simulation<dim> simulation(parameters, file, options, communicator, nullptr, std::move(checkpoint));
   return simulation.run() ? exit_success : exit_interrupted;
 }
 

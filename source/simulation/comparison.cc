@@ -353,6 +353,14 @@ void Comparison<dim>::write_errors(const std::string &file_name) const
     throw NumericalError("cannot write '" + file_name + "'");
 }
 
+template <int dim>
+void Comparison<dim>::persist(Archive &archive)
+{
+  archive.begin("comparison");
+  for (Reference &reference : references)
+    archive(reference.done, reference.samples, reference.n_outside);
+}
+
 template class Comparison<2>;
 template class Comparison<3>;
 } // namespace peat

@@ -12,11 +12,8 @@ Log::Log(const std::string &directory, const bool is_first_rank, const bool quie
     : active(is_first_rank), quiet(quiet), terminal(isatty(STDOUT_FILENO)),
       start(std::chrono::steady_clock::now()), last_progress(start)
 {
-  if (active && !directory.empty()) {
-    file.open(directory + "/log.txt");
-    if (!file)
-      throw InputError("cannot write to the output directory '" + directory + "'");
-  }
+  if (active && !directory.empty())
+    file = GrowingFile(directory + "/log.txt");
 }
 
 Log::~Log()
@@ -37,7 +34,7 @@ void Log::line(const std::string &text)
     return;
   end_progress();
   if (file.is_open())
-    file << text << std::endl;
+    file.lines() << text << std::endl;
   if (!quiet)
     std::cout << text << std::endl;
 }
@@ -65,13 +62,17 @@ void Log::show(const std::string &text)
 void Log::progress(const double fraction, const double time, const unsigned long step,
                    const double point_steps_per_second)
 {
+  if (first_fraction < 0.)
+    first_fraction = fraction;
   if (!is_due())
     return;
   const double elapsed = std::chrono::duration<double>(last_progress - start).count();
   char text[160];
   std::snprintf(text, sizeof(text), "%5.1f %%  t = %.4g s  step %lu  %.1f million point-steps/s  %s to go",
                 100. * fraction, time, step, 1e-6 * point_steps_per_second,
-                fraction > 0. ? readable_duration(elapsed * (1. - fraction) / fraction).c_str() : "?");
+                fraction > first_fraction
+                    ? readable_duration(elapsed * (1. - fraction) / (fraction - first_fraction)).c_str()
+                    : "?");
   show(text);
 }
 

@@ -22,6 +22,9 @@ OutputParameters::OutputParameters(Section section)
               "Time between the lines of statistics.csv; 0: 200 lines a stage.");
   section.add("Probe interval", probe_interval, nonnegative("s"),
               "Time between the lines of probes.csv; 0: as statistics.csv.");
+  section.add("Checkpoint interval", checkpoint_interval, nonnegative("min"),
+              "Wall-clock time between checkpoints, from which 'peat run --resume' goes on; 0: only when a "
+              "signal ends the run.");
 }
 
 template struct ProbeParameters<2>;

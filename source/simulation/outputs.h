@@ -40,6 +40,24 @@ struct Simulation<dim>::Outputs
     recording_times = Schedule::at(recorder ? recorder->times() : std::vector<double>(), start, end);
   }
 
+  /// What was due up to now has been written.
+  void skip(const double now)
+  {
+    for (Schedule *times :
+         {&statistics_times, &probe_times, &picture_times, &comparison_times, &recording_times})
+      times->due(now);
+  }
+
+  void persist(Archive &archive)
+  {
+    archive.begin("outputs");
+    archive(statistics, line_step, picture_step);
+    if (probes)
+      archive(*probes);
+    if (pictures)
+      archive(*pictures);
+  }
+
   /// When something is next due.
   double next() const
   {
@@ -55,6 +73,9 @@ struct Simulation<dim>::Outputs
   std::unique_ptr<ProbeWriter<dim>> probes;
   std::unique_ptr<Pictures<dim>> pictures;
   bool every_step = false; ///< statistics and probes are written after each step
+  /// Steps after which the last line of statistics and the last picture were written.
+  unsigned long line_step = never, picture_step = never;
+  static constexpr unsigned long never = std::numeric_limits<unsigned long>::max();
   Schedule statistics_times, probe_times, picture_times, comparison_times, recording_times;
 };
 } // namespace peat

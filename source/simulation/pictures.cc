@@ -329,6 +329,15 @@ bool Pictures<dim>::write_list() const
   return file && !error;
 }
 
+template <int dim>
+void Pictures<dim>::persist(Archive &archive)
+{
+  archive.begin("pictures");
+  archive(n_times, parts, entries);
+  if (archive.is_loading() && dealii::Utilities::MPI::this_mpi_process(communicator) == 0)
+    write_list();
+}
+
 template class Pictures<2>;
 template class Pictures<3>;
 } // namespace peat

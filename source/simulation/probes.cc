@@ -34,12 +34,16 @@ ProbeWriter<dim>::ProbeWriter(const Case<dim> &parameters, const Scene<dim> &sce
                       scene.body_at(probe.point, touching * grid.smallest_cell_size())});
   choose_fields(parameters);
   values.assign(probes.size() * (dim + fields.size()), nan);
-  if (!probes.empty() && dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0) {
-    file.open(file_name);
-    write_header();
-  }
-  if (dealii::Utilities::MPI::min(int(file.good()), grid.communicator()) == 0)
-    throw InputError("cannot write '" + file_name + "'");
+  std::string problem;
+  if (!probes.empty() && dealii::Utilities::MPI::this_mpi_process(grid.communicator()) == 0)
+    try {
+      file = GrowingFile(file_name);
+    } catch (const InputError &error) {
+      problem = error.what();
+    }
+  problem = dealii::Utilities::MPI::broadcast(grid.communicator(), problem);
+  if (!problem.empty())
+    throw InputError(problem);
 }
 
 template <int dim>
@@ -72,15 +76,16 @@ void ProbeWriter<dim>::choose_fields(const Case<dim> &parameters)
 template <int dim>
 void ProbeWriter<dim>::write_header()
 {
-  file << "time [s]";
+  std::ostream &out = file.lines();
+  out << "time [s]";
   for (const Probe &probe : probes) {
     for (unsigned int d = 0; d < dim; ++d)
-      file << ',' << csv_entry(probe.name + '/' + axis_names[d] + " [m]");
+      out << ',' << csv_entry(probe.name + '/' + axis_names[d] + " [m]");
     for (std::size_t f = 0; f < fields.size(); ++f)
-      file << ','
-           << csv_entry(probe.name + '/' + fields[f] + " [" + (units[f].empty() ? "-" : units[f]) + ']');
+      out << ','
+          << csv_entry(probe.name + '/' + fields[f] + " [" + (units[f].empty() ? "-" : units[f]) + ']');
   }
-  file << std::endl;
+  out << std::endl;
 }
 
 template <int dim>
@@ -98,13 +103,16 @@ void ProbeWriter<dim>::write(const double time)
 
   if (!file.is_open())
     return;
-  file << std::setprecision(12) << time << std::setprecision(10);
+  if (file.is_new())
+    write_header();
+  std::ostream &out = file.lines();
+  out << std::setprecision(12) << time << std::setprecision(10);
   for (const double value : values) {
-    file << ',';
+    out << ',';
     if (std::isfinite(value))
-      file << value;
+      out << value;
   }
-  file << std::endl;
+  out << std::endl;
 }
 
 template <int dim>

@@ -14,8 +14,7 @@ volatile std::sig_atomic_t signal_received = 0;
 
 std::string prepare_directory(const RunOptions &options, MPI_Comm communicator)
 {
-  const std::string directory =
-      options.output.empty() ? default_output_directory(options.file) : options.output;
+  const std::string directory = output_directory(options);
   std::string problem;
   if (dealii::Utilities::MPI::this_mpi_process(communicator) == 0) {
     std::error_code error;
@@ -47,6 +46,22 @@ std::string default_output_directory(const std::string &file_name)
   return "output/" + std::filesystem::path(file_name).stem().string();
 }
 
+std::string output_directory(const RunOptions &options)
+{
+  return options.output.empty() ? default_output_directory(options.file) : options.output;
+}
+
+void StepRecord::persist(Archive &archive)
+{
+  archive(n_steps, smallest, largest, total_time, limit);
+}
+
+void StageProgress::persist(Archive &archive)
+{
+  archive(stage, scheme, largest_step, stable.dt, stable.limit, steps_since_check, dt, steps_left,
+          reaches_event, energy_at_start);
+}
+
 void StepRecord::add(const double dt)
 {
   ++n_steps;
@@ -57,13 +72,15 @@ void StepRecord::add(const double dt)
 
 template <int dim>
 Simulation<dim>::Simulation(Case<dim> &parameters, const ParameterFile &file, const RunOptions &options,
-                            MPI_Comm communicator, Recorder<dim> *recorder)
+                            MPI_Comm communicator, Recorder<dim> *recorder, std::unique_ptr<Checkpoint> begun)
     : begin(seconds()), parameters(parameters), options(options), communicator(communicator),
       grid(parameters.grid, communicator), scene(make_scene(parameters, grid)),
       comparison(parameters, std::filesystem::path(options.file).parent_path().string()), recorder(recorder),
       directory(prepare_directory(options, communicator)),
       log(directory, dealii::Utilities::MPI::this_mpi_process(communicator) == 0, options.quiet),
-      stage_scheme(parameters.scheme)
+      stage_scheme(parameters.scheme), checkpoint(std::move(begun)),
+      checkpoints(directory, file, !checkpoint, communicator),
+      watch(60. * parameters.output.checkpoint_interval, communicator)
 {
   const bool first = dealii::Utilities::MPI::this_mpi_process(communicator) == 0;
   if (first) {
@@ -84,13 +101,18 @@ bool Simulation<dim>::run()
   planned_end = parameters.end_time();
   double start = 0.;
   try {
-    for (const StageParameters &stage : parameters.stages) {
-      run_stage(stage, start);
-      if (stopped)
-        break;
+    const std::size_t first = checkpoint ? resume() : 0;
+    for (std::size_t s = 0; s < parameters.stages.size() && !stopped; ++s) {
+      const StageParameters &stage = parameters.stages[s];
+      progress.stage = s;
+      if (s > first || !checkpoint)
+        begin_stage(stage, start);
+      if (s >= first)
+        finish_stage(stage, start);
       start += stage.duration;
     }
   } catch (const NumericalError &) {
+    outputs->line_step = outputs->picture_step = Outputs::never;
     report(now, true);
     write_summary();
     throw;
@@ -101,18 +123,11 @@ bool Simulation<dim>::run()
 }
 
 template <int dim>
-bool Simulation<dim>::interrupted()
-{
-  // Ranks receive signals at different moments; they ask each other now and then.
-  if (dealii::Utilities::MPI::n_mpi_processes(communicator) == 1)
-    return signal_was_caught();
-  return steps.n_steps % 50 == 0 && dealii::Utilities::MPI::max(int(signal_received), communicator) != 0;
-}
-
-template <int dim>
 void Simulation<dim>::report(const double time, const bool everything)
 {
-  if (outputs->statistics_times.due(time) || outputs->every_step || everything) {
+  if (outputs->statistics_times.due(time) || outputs->every_step ||
+      (everything && outputs->line_step != steps.n_steps)) {
+    outputs->line_step = steps.n_steps;
     const Totals<dim> sums = totals(scene, communicator);
     balances->update(sums, solver->ledger(), communicator);
     outputs->statistics.write(time, steps.n_steps, steps.n_steps ? solver->fields().dt : 0., steps.limit,
@@ -127,8 +142,11 @@ void Simulation<dim>::report(const double time, const bool everything)
     outputs->probes->write(time);
     comparison.compare(*outputs->probes);
   }
-  if (outputs->pictures && (outputs->picture_times.due(time) || everything))
+  if (outputs->pictures &&
+      (outputs->picture_times.due(time) || (everything && outputs->picture_step != steps.n_steps))) {
+    outputs->picture_step = steps.n_steps;
     outputs->pictures->write(time, solver->nodes(), solver->fields());
+  }
 }
 
 template <int dim>

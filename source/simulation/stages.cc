@@ -9,25 +9,50 @@
 
 namespace peat {
 template <int dim>
-void Simulation<dim>::run_stage(const StageParameters &stage, const double start)
+void Simulation<dim>::begin_stage(const StageParameters &stage, const double start)
 {
   bring_in_bodies(stage);
-  const bool dynamic = stage.solver == StageParameters::Solver::dynamic;
-  SchemeEstimate chosen;
-  if (dynamic && parameters.method == Method::mpm)
-    chosen = choose_scheme(stage, start);
-  const bool implicit = parameters.method == Method::fem || !dynamic || chosen.scheme == Scheme::implicit;
-  note_scheme(implicit ? Scheme::implicit : chosen.scheme);
-  const bool fits_steps = implicit && (parameters.method == Method::mpm || !dynamic);
-  outputs->plan(parameters.output, comparison, recorder, start, start + stage.duration, fits_steps);
-  if (parameters.method == Method::mpm && implicit)
+  if (stage.solver == StageParameters::Solver::dynamic && parameters.method == Method::mpm) {
+    const SchemeEstimate chosen = choose_scheme(stage, start);
+    progress.scheme = chosen.scheme;
+    progress.largest_step = chosen.largest_step;
+  }
+  note_scheme(is_implicit(stage) ? Scheme::implicit : progress.scheme);
+  plan_outputs(stage, start);
+  if (parameters.method == Method::mpm && is_implicit(stage))
     note_contacts(stage);
   if (stage.solver == StageParameters::Solver::static_state)
     run_static_stage(stage, start);
-  else if (implicit)
-    run_implicit_stage(stage, start);
+  else if (is_implicit(stage))
+    begin_implicit_stage(stage, start);
   else
-    run_explicit_stage(stage, start, chosen);
+    begin_explicit_stage(stage, start);
+}
+
+template <int dim>
+void Simulation<dim>::finish_stage(const StageParameters &stage, const double start)
+{
+  if (stage.solver == StageParameters::Solver::static_state)
+    return;
+  if (is_implicit(stage))
+    take_implicit_steps(start + stage.duration);
+  else
+    take_explicit_steps(start + stage.duration);
+}
+
+template <int dim>
+bool Simulation<dim>::is_implicit(const StageParameters &stage) const
+{
+  return parameters.method == Method::fem || stage.solver != StageParameters::Solver::dynamic ||
+         progress.scheme == Scheme::implicit;
+}
+
+template <int dim>
+void Simulation<dim>::plan_outputs(const StageParameters &stage, const double start)
+{
+  const bool dynamic = stage.solver == StageParameters::Solver::dynamic;
+  const bool fits_steps = is_implicit(stage) && (parameters.method == Method::mpm || !dynamic);
+  outputs->plan(parameters.output, comparison, recorder, start, start + stage.duration, fits_steps);
 }
 
 template <int dim>
@@ -84,7 +109,7 @@ void Simulation<dim>::bring_in_bodies(const StageParameters &stage)
 }
 
 template <int dim>
-void Simulation<dim>::begin_stage(const StageParameters &stage, const StableStep &step)
+void Simulation<dim>::tell_of_stage(const StageParameters &stage, const StableStep &step)
 {
   std::ostringstream message;
   message << "stage '" << stage.name << "': " << stage.duration << " s, "
@@ -104,18 +129,25 @@ unsigned long Simulation<dim>::unknowns_of_solver() const
 }
 
 template <int dim>
+void Simulation<dim>::construct_up_solver(const typename UpSolver<dim>::Method method, const double start)
+{
+  const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
+  auto made = std::make_unique<UpSolver<dim>>(parameters.implicit, parameters.linear, method,
+                                              parameters.displacement_nodes(),
+                                              parameters.scheme.seepage_inertia, grid, scene, start, carried);
+  up_solver = made.get();
+  explicit_solver = nullptr;
+  solver = std::move(made);
+}
+
+template <int dim>
 void Simulation<dim>::make_up_solver(const typename UpSolver<dim>::Method method, const double start)
 {
   // Finite elements keep their nodal values from stage to stage.
   if (up_solver && method == UpSolver<dim>::Method::finite_elements)
     return;
-  const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
-  auto made = std::make_unique<UpSolver<dim>>(parameters.implicit, parameters.linear, method,
-                                              parameters.displacement_nodes(),
-                                              parameters.scheme.seepage_inertia, grid, scene, start, carried);
-  made->prepare();
-  up_solver = made.get();
-  solver = std::move(made);
+  construct_up_solver(method, start);
+  up_solver->prepare();
 }
 
 namespace {
@@ -179,18 +211,27 @@ void Simulation<dim>::run_static_stage(const StageParameters &stage, const doubl
 }
 
 template <int dim>
-void Simulation<dim>::run_implicit_stage(const StageParameters &stage, const double start)
+typename UpSolver<dim>::Method Simulation<dim>::method_of_steps() const
+{
+  return parameters.method == Method::fem ? UpSolver<dim>::Method::finite_elements
+                                          : UpSolver<dim>::Method::material_points;
+}
+
+template <int dim>
+void Simulation<dim>::begin_implicit_stage(const StageParameters &stage, const double start)
 {
   using Mode = typename UpSolver<dim>::Mode;
-  const double end = start + stage.duration;
-  make_up_solver(parameters.method == peat::Method::fem ? UpSolver<dim>::Method::finite_elements
-                                                        : UpSolver<dim>::Method::material_points,
-                 start);
+  make_up_solver(method_of_steps(), start);
   up_solver->start(stage.solver == StageParameters::Solver::quasi_static ? Mode::quasi_static
                                                                          : Mode::dynamic);
   balances->count_inertia(stage.solver != StageParameters::Solver::quasi_static, totals(scene, communicator));
-  begin_stage(stage, up_solver->suggested_step());
-  ContactEvents<dim> events(log, communicator);
+  tell_of_stage(stage, up_solver->suggested_step());
+  events = std::make_unique<ContactEvents<dim>>(log, communicator);
+}
+
+template <int dim>
+void Simulation<dim>::take_implicit_steps(const double end)
+{
   double clock = seconds();
   while (now < end && !stopped) {
     const double event = std::min(end, outputs->next());
@@ -198,22 +239,25 @@ void Simulation<dim>::run_implicit_stage(const StageParameters &stage, const dou
     const double dt = up_solver->step(event);
     steps.add(dt);
     now = up_solver->time();
-    events.note(now, dt, scene);
-    stopped = interrupted();
+    events->note(now, dt, scene);
+    const Watch::Call call = watch.ask();
     const double lap = seconds();
     wall.time_loop += lap - clock;
     if (now >= event * (1. - 1e-12)) {
       now = event;
       up_solver->set_time(now);
     }
-    report(now, stopped || now >= end);
+    report(now, now >= end);
+    heed(call);
     clock = seconds();
     wall.output += clock - lap;
     log.progress(now / planned_end, now, steps.n_steps,
                  steps.n_steps * double(scene.n_global_points()) / std::max(1e-9, wall.time_loop));
   }
+  if (stopped)
+    report(now, true);
   if (!scene.contact_states.empty())
-    events.summarise(scene);
+    events->summarise(scene);
   report_work();
 }
 
@@ -291,71 +335,94 @@ void check_step_factor(const SchemeParameters &scheme, const Balances<dim> &bala
 } // namespace
 
 template <int dim>
-void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const double start,
-                                         const SchemeEstimate &estimate)
+void Simulation<dim>::make_explicit_solver(const StageParameters &stage, const double start)
 {
-  const double end = start + stage.duration;
-  stage_scheme.implicit_pressure = estimate.scheme == Scheme::semi_implicit;
-  stage_scheme.largest_step = estimate.largest_step;
+  stage_scheme.implicit_pressure = progress.scheme == Scheme::semi_implicit;
+  stage_scheme.largest_step = progress.largest_step;
   stage_scheme.local_damping = std::max(parameters.scheme.local_damping, stage.local_damping);
   const Ledger<dim> carried = solver ? solver->ledger() : Ledger<dim>();
   up_solver = nullptr;
   auto made = std::make_unique<ExplicitMPM<dim>>(stage_scheme, grid, scene, start, carried);
-  ExplicitMPM<dim> &mpm = *made;
+  explicit_solver = made.get();
   solver = std::move(made);
+}
+
+template <int dim>
+void Simulation<dim>::begin_explicit_stage(const StageParameters &stage, const double start)
+{
+  make_explicit_solver(stage, start);
+  ExplicitMPM<dim> &mpm = *explicit_solver;
   mpm.prepare();
   balances->count_inertia(true, totals(scene, communicator));
-  begin_stage(stage, mpm.stable_step());
-  ContactEvents<dim> events(log, communicator);
-  const double energy_at_start = totals(scene, communicator).energy();
+  tell_of_stage(stage, mpm.stable_step());
+  events = std::make_unique<ContactEvents<dim>>(log, communicator);
+  progress.energy_at_start = totals(scene, communicator).energy();
+  progress.stable = mpm.stable_step();
+  progress.steps_since_check = progress.steps_left = 0;
+}
 
+template <int dim>
+void Simulation<dim>::plan_steps(const double event)
+{
   // Between two events the step is constant, unless the stable step has changed by then.
   constexpr unsigned int steps_between_checks = 100;
-  unsigned int steps_since_check = 0;
-  StableStep stable = mpm.stable_step();
+  if (progress.steps_since_check >= steps_between_checks) {
+    progress.stable = explicit_solver->stable_step();
+    progress.steps_since_check = 0;
+  }
+  const StableStep &stable = progress.stable;
+  const double wanted = stage_scheme.fixed_step > 0.
+                            ? stage_scheme.fixed_step
+                            : std::min(stage_scheme.step_factor * stable.dt, stage_scheme.largest_step);
+  if (stage_scheme.fixed_step > stable.dt) {
+    std::ostringstream message;
+    message << "'Time step' " << wanted << " s is above the stable step " << stable.dt << " s ("
+            << stable.limit << ") at t = " << now << " s";
+    throw NumericalError(message.str());
+  }
+  steps.limit = stable.limit;
+  const double n_steps = std::ceil((event - now) / wanted * (1. - 1e-12));
+  progress.dt = (event - now) / n_steps;
+  progress.steps_left = std::min<double>(n_steps, steps_between_checks - progress.steps_since_check);
+  progress.reaches_event = progress.steps_left == n_steps;
+}
+
+template <int dim>
+void Simulation<dim>::take_explicit_steps(const double end)
+{
+  ExplicitMPM<dim> &mpm = *explicit_solver;
   double clock = seconds();
   while (now < end && !stopped) {
-    if (steps_since_check >= steps_between_checks) {
-      stable = mpm.stable_step();
-      steps_since_check = 0;
-    }
-    const double wanted = stage_scheme.fixed_step > 0.
-                              ? stage_scheme.fixed_step
-                              : std::min(stage_scheme.step_factor * stable.dt, stage_scheme.largest_step);
-    if (stage_scheme.fixed_step > stable.dt) {
-      std::ostringstream message;
-      message << "'Time step' " << wanted << " s is above the stable step " << stable.dt << " s ("
-              << stable.limit << ") at t = " << now << " s";
-      throw NumericalError(message.str());
-    }
-    steps.limit = stable.limit;
     const double event = std::min(end, outputs->next());
-    const double n_steps = std::ceil((event - now) / wanted * (1. - 1e-12));
-    const double dt = (event - now) / n_steps;
-    const unsigned int n_now = std::min<double>(n_steps, steps_between_checks - steps_since_check);
-    const bool reaches_event = n_now == n_steps;
-    for (unsigned int i = 0; i < n_now && !stopped; ++i) {
-      step_within(mpm, stage_scheme, dt);
-      steps.add(dt);
-      events.note(mpm.time(), dt, scene);
-      ++steps_since_check;
+    if (progress.steps_left == 0)
+      plan_steps(event);
+    Watch::Call call = Watch::Call::none;
+    while (progress.steps_left > 0 && call == Watch::Call::none) {
+      step_within(mpm, stage_scheme, progress.dt);
+      steps.add(progress.dt);
+      events->note(mpm.time(), progress.dt, scene);
+      ++progress.steps_since_check;
+      --progress.steps_left;
       now = mpm.time();
-      stopped = interrupted();
+      call = watch.ask();
     }
     const double lap = seconds();
     wall.time_loop += lap - clock;
-    if (reaches_event && !stopped) {
+    if (progress.reaches_event && progress.steps_left == 0) {
       now = event;
       mpm.set_time(now);
     }
-    report(now, stopped || now >= end);
-    check_step_factor(stage_scheme, *balances, energy_at_start, now);
+    report(now, now >= end);
+    check_step_factor(stage_scheme, *balances, progress.energy_at_start, now);
+    heed(call);
     clock = seconds();
     wall.output += clock - lap;
     log.progress(now / planned_end, now, steps.n_steps,
                  steps.n_steps * double(scene.n_global_points()) / std::max(1e-9, wall.time_loop));
   }
-  events.summarise(scene);
+  if (stopped)
+    report(now, true);
+  events->summarise(scene);
   constexpr double worth_a_word = 0.05;
   if (made_energy(*balances) > worth_a_word) {
     std::ostringstream message;
@@ -366,8 +433,16 @@ void Simulation<dim>::run_explicit_stage(const StageParameters &stage, const dou
   report_work(mpm.pressure_work());
 }
 
-template unsigned long Simulation<2>::unknowns_of_solver() const;
-template unsigned long Simulation<3>::unknowns_of_solver() const;
-template void Simulation<2>::run_stage(const StageParameters &, double);
-template void Simulation<3>::run_stage(const StageParameters &, double);
+#define PEAT_INSTANTIATE(dim)                                                                                \
+  template unsigned long Simulation<dim>::unknowns_of_solver() const;                                        \
+  template void Simulation<dim>::begin_stage(const StageParameters &, double);                               \
+  template void Simulation<dim>::finish_stage(const StageParameters &, double);                              \
+  template bool Simulation<dim>::is_implicit(const StageParameters &) const;                                 \
+  template void Simulation<dim>::plan_outputs(const StageParameters &, double);                              \
+  template void Simulation<dim>::make_explicit_solver(const StageParameters &, double);                      \
+  template UpSolver<dim>::Method Simulation<dim>::method_of_steps() const;                                   \
+  template void Simulation<dim>::construct_up_solver(UpSolver<dim>::Method, double);
+PEAT_INSTANTIATE(2)
+PEAT_INSTANTIATE(3)
+#undef PEAT_INSTANTIATE
 } // namespace peat

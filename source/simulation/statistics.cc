@@ -72,30 +72,31 @@ std::vector<double> contact_row(const Scene<dim> &scene, const std::string &name
 
 template <int dim>
 Statistics<dim>::Statistics(const std::string &directory, const Scene<dim> &scene, const bool is_first_rank)
-    : scene(scene)
+    : scene(scene), file(is_first_rank ? GrowingFile(directory + "/statistics.csv") : GrowingFile())
+{}
+
+template <int dim>
+void Statistics<dim>::write_header()
 {
-  if (!is_first_rank)
-    return;
-  file.open(directory + "/statistics.csv");
-  file.precision(15);
-  file << "time [s],step,dt [s],binding limit,mass [kg],kinetic energy [J],elastic energy [J],fluid energy "
-          "[J],"
-          "external work [J],gravity work [J],seepage dissipation [J],contact dissipation [J],numerical "
-          "dissipation [J],fluid "
-          "outflow [m^"
-       << dim << "],largest speed [m/s]";
+  std::ostream &out = file.lines();
+  out << "time [s],step,dt [s],binding limit,mass [kg],kinetic energy [J],elastic energy [J],fluid energy "
+         "[J],"
+         "external work [J],gravity work [J],seepage dissipation [J],contact dissipation [J],numerical "
+         "dissipation [J],fluid "
+         "outflow [m^"
+      << dim << "],largest speed [m/s]";
   const char axes[] = "xyz";
   for (const std::string quantity : {"momentum", "impulse", "center"})
     for (unsigned int d = 0; d < dim; ++d)
-      file << ',' << quantity << ' ' << axes[d] << (quantity == "center" ? " [m]" : " [N s]");
-  file << ",fluid mass error,momentum error,energy error";
+      out << ',' << quantity << ' ' << axes[d] << (quantity == "center" ? " [m]" : " [N s]");
+  out << ",fluid mass error,momentum error,energy error";
   for (const auto &contact : scene.contacts)
     for (const std::string &column : contact_columns<dim>(contact.name))
-      file << ',' << csv_entry(column);
+      out << ',' << csv_entry(column);
   for (const auto &rigid : scene.rigid_bodies)
     for (const std::string &column : rigid_columns<dim>(rigid->name()))
-      file << ',' << csv_entry(column);
-  file << '\n';
+      out << ',' << csv_entry(column);
+  out << '\n';
 }
 
 template <int dim>
@@ -105,23 +106,27 @@ void Statistics<dim>::write(const double time, const unsigned long step, const d
 {
   if (!file.is_open())
     return;
+  if (file.is_new())
+    write_header();
   const Ledger<dim> &book = balances.ledger();
-  file << time << ',' << step << ',' << dt << ',' << limit << ',' << totals.mass << ','
-       << totals.kinetic_energy << ',' << totals.elastic_energy << ',' << totals.fluid_energy << ','
-       << book.external_work << ',' << book.gravity_work << ',' << book.seepage_dissipation << ','
-       << book.contact_dissipation << ',' << balances.numerical_dissipation << ',' << book.fluid_outflow
-       << ',' << totals.largest_speed;
+  std::ostream &out = file.lines();
+  out.precision(15);
+  out << time << ',' << step << ',' << dt << ',' << limit << ',' << totals.mass << ','
+      << totals.kinetic_energy << ',' << totals.elastic_energy << ',' << totals.fluid_energy << ','
+      << book.external_work << ',' << book.gravity_work << ',' << book.seepage_dissipation << ','
+      << book.contact_dissipation << ',' << balances.numerical_dissipation << ',' << book.fluid_outflow << ','
+      << totals.largest_speed;
   for (const auto &vector : {totals.momentum, book.impulse, totals.center})
     for (unsigned int d = 0; d < dim; ++d)
-      file << ',' << vector[d];
-  file << ',' << balances.fluid_error << ',' << balances.momentum_error << ',' << balances.energy_error;
+      out << ',' << vector[d];
+  out << ',' << balances.fluid_error << ',' << balances.momentum_error << ',' << balances.energy_error;
   for (const auto &contact : scene.contacts)
     for (const double value : contact_row(scene, contact.name))
-      file << ',' << value;
+      out << ',' << value;
   for (const auto &rigid : scene.rigid_bodies)
     for (const double value : rigid_row(*rigid))
-      file << ',' << value;
-  file << std::endl;
+      out << ',' << value;
+  out << std::endl;
 }
 
 template class Statistics<2>;

@@ -295,6 +295,13 @@ void BodyContact<dim>::constrain_carrying_velocity()
   this->change_carrying_velocity(second, noted[1]);
 }
 
+template <int dim>
+void BodyContact<dim>::persist(Archive &archive)
+{
+  archive.begin("contact of bodies");
+  archive(planes);
+}
+
 template class BodyContact<2>;
 template class BodyContact<3>;
 } // namespace peat

@@ -303,6 +303,13 @@ void ContactSolver<dim>::constrain_carrying_velocity()
   for_each([](auto &pair) { pair.constrain_carrying_velocity(); });
 }
 
+template <int dim>
+void ContactSolver<dim>::persist(Archive &archive)
+{
+  archive.begin("contacts");
+  for_each([&](auto &pair) { pair.persist(archive); });
+}
+
 template class ContactSolver<2>;
 template class ContactSolver<3>;
 } // namespace peat

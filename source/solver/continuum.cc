@@ -466,6 +466,15 @@ void Continuum<dim>::move_tracers()
   }
 }
 
+template <int dim>
+void Continuum<dim>::persist(Archive &archive)
+{
+  archive.begin("continuum");
+  archive(nodal.time, nodal.dt, nodal.contact_force, near_small_node, steps_to_small_nodes, unfelt_velocity);
+  if (pressure)
+    archive(*pressure);
+}
+
 template class Continuum<2>;
 template class Continuum<3>;
 } // namespace peat

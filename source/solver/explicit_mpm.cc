@@ -261,6 +261,18 @@ StableStep ExplicitMPM<dim>::stable_step() const
   return peat::stable_step<dim>(scene.bodies, grid, scheme.seepage_inertia, scheme.implicit_pressure);
 }
 
+template <int dim>
+void ExplicitMPM<dim>::persist(Archive &archive)
+{
+  if (archive.is_loading())
+    prepare();
+  archive.begin("explicit steps");
+  archive(now, book);
+  for (const auto &continuum : continua)
+    archive(*continuum);
+  archive(contact, pressures);
+}
+
 template class ExplicitMPM<2>;
 template class ExplicitMPM<3>;
 } // namespace peat

@@ -67,6 +67,13 @@ template <int dim>
 bool ImplicitContact<dim>::enter()
 {
   scene.contact_states.clear();
+  make_movers();
+  return !movers.empty();
+}
+
+template <int dim>
+void ImplicitContact<dim>::make_movers()
+{
   movers.clear();
   touches.clear();
   for (const auto &rigid : scene.rigid_bodies) {
@@ -80,7 +87,33 @@ bool ImplicitContact<dim>::enter()
       movers.back()->may_touch = true;
     }
   }
-  return !movers.empty();
+}
+
+template <int dim>
+void ImplicitContact<dim>::persist(Archive &archive)
+{
+  archive.begin("implicit contact");
+  bool entered = !movers.empty();
+  archive(entered);
+  if (!entered)
+    return;
+  if (archive.is_loading())
+    make_movers();
+  for (const auto &mover : movers)
+    archive(mover->moved, mover->scale);
+}
+
+template <int dim>
+void ImplicitContact<dim>::persist_nodes(Archive &archive, const ActiveNodes<dim> &active,
+                                         const dealii::AffineConstraints<double> &constraints)
+{
+  for (const auto &touch : touches)
+    touch->surface.persist(archive, active);
+  if (!archive.is_loading())
+    return;
+  nodes = &active;
+  held = &constraints;
+  find_line_couplings();
 }
 
 template <int dim>
@@ -96,14 +129,20 @@ void ImplicitContact<dim>::match_nodes(const ActiveNodes<dim> &active,
 {
   nodes = &active;
   held = &constraints;
+  for (const auto &touch : touches)
+    touch->surface.choose(active);
+  find_line_couplings();
+}
+
+template <int dim>
+void ImplicitContact<dim>::find_line_couplings()
+{
   responses_known = false;
   couplings.clear();
   std::vector<NodeId> chosen;
-  for (const auto &touch : touches) {
-    touch->surface.choose(active);
+  for (const auto &touch : touches)
     for (const ContactSite<dim> &site : touch->sites)
-      chosen.push_back(active.grid_node(site.second));
-  }
+      chosen.push_back(nodes->grid_node(site.second));
   // The lines that may carry a site.
   for (const NodeId node : chosen)
     for (unsigned int axis = 0; axis < dim; ++axis) {

@@ -5,9 +5,12 @@
 
 #include <Teuchos_ParameterList.hpp>
 #include <ml_MultiLevelPreconditioner.h>
+#include <ml_utils.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "persist_algebra.h"
 
 namespace peat {
 namespace {
@@ -379,14 +382,13 @@ void ImplicitPressure<dim>::find_diagonal()
 }
 
 template <int dim>
-void ImplicitPressure<dim>::make_multigrid()
+void ImplicitPressure<dim>::number_star()
 {
-  // Full cells with the stabilisation have this operator; others nearly.
   using S = dealii::types::global_dof_index;
   const dealii::IndexSet &owned = x.locally_owned_elements();
   dealii::TrilinosWrappers::SparsityPattern pattern(owned, owned, communicator, 2 * dim + 1);
-  const S first = sums.storage.empty() ? 0 : owned.nth_index_in_set(0);
-  for (std::size_t k = 0; k < sums.storage.size(); ++k) {
+  const S first = cell_of_unknown.empty() ? 0 : owned.nth_index_in_set(0);
+  for (std::size_t k = 0; k < cell_of_unknown.size(); ++k) {
     pattern.add(first + k, first + k);
     for (const double other : neighbour[k])
       if (other >= 0.)
@@ -394,6 +396,14 @@ void ImplicitPressure<dim>::make_multigrid()
   }
   pattern.compress();
   star.reinit(pattern);
+}
+
+template <int dim>
+void ImplicitPressure<dim>::fill_star()
+{
+  // Full cells with the stabilisation have this operator; others nearly.
+  using S = dealii::types::global_dof_index;
+  const S first = star.local_range().first;
   const Grid<dim> &grid = active.grid();
   for (std::size_t k = 0; k < sums.storage.size(); ++k) {
     double own = sums.storage[k];
@@ -425,7 +435,11 @@ void ImplicitPressure<dim>::make_multigrid()
   for (std::size_t k = 0; k < sums.storage.size(); ++k)
     largest = std::max(largest, star.diag_element(first + k));
   star *= 1. / dealii::Utilities::MPI::max(largest, communicator);
+}
 
+template <int dim>
+void ImplicitPressure<dim>::make_multigrid()
+{
   Teuchos::ParameterList list;
   ML_Epetra::SetDefaults("SA", list);
   list.set("ML output", 0);
@@ -436,9 +450,8 @@ void ImplicitPressure<dim>::make_multigrid()
   list.set("coarse: type", "Amesos-KLU");
   list.set("coarse: max size", 1000);
   multigrid = std::make_unique<dealii::TrilinosWrappers::PreconditionAMG>();
+  ML_set_random_seed(multigrid_seed);
   multigrid->initialize(star, list);
-  fresh_iterations = 0;
-  ++multigrids_made;
 }
 
 template <int dim>
@@ -536,7 +549,27 @@ void ImplicitPressure<dim>::prepare(const NodeFreedom<dim> &freedom, const deali
   find_mode_responses();
   find_diagonal();
   find_right_side(gravity, nodal);
-  if (wants_multigrid && !multigrid)
+  if (!wants_multigrid || multigrid)
+    return;
+  number_star();
+  fill_star();
+  make_multigrid();
+  fresh_iterations = 0;
+  ++multigrids_made;
+}
+
+template <int dim>
+void ImplicitPressure<dim>::persist(Archive &archive)
+{
+  archive.begin("implicit pressure");
+  bool has_multigrid = multigrid != nullptr;
+  archive(outflow, squeezed, wants_multigrid, fresh_iterations, multigrids_made, has_multigrid);
+  if (!has_multigrid)
+    return;
+  if (archive.is_loading())
+    number_star();
+  persist_values(archive, star);
+  if (archive.is_loading())
     make_multigrid();
 }
 

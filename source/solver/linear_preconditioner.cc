@@ -1,4 +1,5 @@
 #include "linear_preconditioner.h"
+#include "persist_algebra.h"
 
 #include <peat/base/error.h>
 
@@ -8,6 +9,7 @@
 #include <Epetra_Import.h>
 #include <Teuchos_ParameterList.hpp>
 #include <ml_MultiLevelPreconditioner.h>
+#include <ml_utils.h>
 
 #include <algorithm>
 #include <cmath>
@@ -130,9 +132,25 @@ void Multigrid::build(TrilinosMatrix &matrix, const unsigned int n_components)
 {
   factor = 1. / absolute_diagonal(matrix).linfty_norm();
   matrix *= factor;
+  make(matrix, n_components);
+}
+
+void Multigrid::make(const TrilinosMatrix &matrix, const unsigned int n_components)
+{
   Teuchos::ParameterList list = multigrid_settings();
   list.set("PDE equations", int(n_components));
+  ML_set_random_seed(multigrid_seed);
   amg.initialize(matrix, list);
+}
+
+void Multigrid::persist(Archive &archive, TrilinosMatrix &matrix, const unsigned int n_components)
+{
+  archive(factor);
+  if (archive.is_loading())
+    amg.clear(); // goes before its matrix
+  persist_rows(archive, matrix);
+  if (archive.is_loading())
+    make(matrix, n_components);
 }
 
 std::vector<std::vector<double>> lattice_places(const DisplacementUnknowns &unknowns, MPI_Comm communicator)
@@ -223,6 +241,7 @@ void Multigrid::build(const TrilinosMatrix &matrix, const std::vector<double> &m
     for (unsigned int d = 0; d < dim; ++d)
       list.set(names[d], pointer(places[d]));
   }
+  ML_set_random_seed(multigrid_seed);
   amg.initialize(matrix, list);
 }
 
@@ -253,6 +272,13 @@ void SchurInverse::build(const BlockMatrix &matrix, const PreconditionerData &da
     inert_inverse.build(inert, 1);
   }
   scratch.reinit(stiff.locally_owned_range_indices(), stiff.get_mpi_communicator());
+}
+
+void SchurInverse::persist(Archive &archive)
+{
+  stiff_inverse.persist(archive, stiff, 1);
+  if (has_inertia)
+    inert_inverse.persist(archive, inert, 1);
 }
 
 void SchurInverse::vmult(TrilinosVector &result, const TrilinosVector &source) const
@@ -304,6 +330,15 @@ void VolumetricInverse::build(const PreconditionerData &data)
   inert_inverse.build(inert, data.n_psi_per_cell);
 }
 
+void VolumetricInverse::persist(Archive &archive, const PreconditionerData &data)
+{
+  persist_values(archive, stiff_inverse);
+  if (!has_inertia)
+    return;
+  persist_values(archive, share);
+  inert_inverse.persist(archive, inert, data.n_psi_per_cell);
+}
+
 void VolumetricInverse::vmult(TrilinosVector &result, const TrilinosVector &source) const
 {
   if (has_inertia) {
@@ -328,10 +363,12 @@ void BlockPreconditioner::build(const BlockMatrix &new_matrix, const Preconditio
 {
   matrix = &new_matrix;
   data = new_data;
-  const TrilinosMatrix &stiffness = data.shear ? *data.shear : matrix->block(0, 0);
   if (places.empty())
     places = lattice_places(unknowns, matrix->get_mpi_communicator());
-  displacement.build(stiffness, modes, places);
+  displacement.build(stiffness(), modes, places);
+  values.clear();
+  for_each_row(stiffness().trilinos_matrix(),
+               [&](const double *row, const int n) { values.insert(values.end(), row, row + n); });
   if (data.shear)
     volumetric.build(data);
   if (matrix->n_block_rows() == 2)
@@ -340,7 +377,24 @@ void BlockPreconditioner::build(const BlockMatrix &new_matrix, const Preconditio
     p_scratch.reinit(matrix->block(1, 1).locally_owned_range_indices(), matrix->get_mpi_communicator());
     psi_scratch = projected = *data.volumetric_compliance;
   }
-  u_scratch.reinit(stiffness.locally_owned_range_indices(), stiffness.get_mpi_communicator());
+  u_scratch.reinit(stiffness().locally_owned_range_indices(), stiffness().get_mpi_communicator());
+}
+
+void BlockPreconditioner::persist(Archive &archive, const BlockMatrix &)
+{
+  archive(values);
+  if (archive.is_loading()) {
+    const double *next = values.data();
+    for_each_row(stiffness().trilinos_matrix(), [&](double *row, const int n) {
+      std::copy_n(next, n, row);
+      next += n;
+    });
+    displacement.build(stiffness(), modes, places);
+  }
+  if (data.shear)
+    volumetric.persist(archive, data);
+  if (matrix->n_block_rows() == 2)
+    schur.persist(archive);
 }
 
 void BlockPreconditioner::vmult(BlockVector &result, const BlockVector &source) const

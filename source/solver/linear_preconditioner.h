@@ -20,6 +20,8 @@ public:
   virtual ~Preconditioner() = default;
   /// Make it for this matrix. Collective.
   virtual void build(const BlockMatrix &matrix, const PreconditionerData &data) = 0;
+  /// See LinearSolver::persist(). Collective.
+  virtual void persist(Archive &archive, const BlockMatrix &matrix) = 0;
   virtual void vmult(BlockVector &result, const BlockVector &source) const = 0;
 };
 
@@ -31,8 +33,10 @@ public:
   explicit DirectFactor(std::string purpose) : purpose(std::move(purpose)) {}
   void build(const LinearSolver::BlockMatrix &matrix, const PreconditionerData &data) override;
   void vmult(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const override;
+  void persist(Archive &archive, const LinearSolver::BlockMatrix &matrix) override;
 
 private:
+  void factorise();
   void make_pattern(const LinearSolver::BlockMatrix &matrix);
   void copy_values(const LinearSolver::BlockMatrix &matrix);
   void complain() const;
@@ -57,9 +61,13 @@ public:
   /// places are those of the nodes, by direction, in steps from node to node. Both must live as long as this.
   void build(const TrilinosMatrix &matrix, const std::vector<double> &modes,
              const std::vector<std::vector<double>> &places);
+  /// Of a matrix that build() has scaled: its values; reading makes the hierarchy of them.
+  void persist(Archive &archive, TrilinosMatrix &matrix, unsigned int n_components);
   void vmult(TrilinosVector &result, const TrilinosVector &source) const;
 
 private:
+  void make(const TrilinosMatrix &matrix, unsigned int n_components);
+
   double factor = 1.; ///< on the matrix
   dealii::TrilinosWrappers::PreconditionAMG amg;
 };
@@ -78,6 +86,7 @@ class SchurInverse
 {
 public:
   void build(const LinearSolver::BlockMatrix &matrix, const PreconditionerData &data);
+  void persist(Archive &archive);
   void vmult(TrilinosVector &result, const TrilinosVector &source) const;
 
 private:
@@ -121,6 +130,7 @@ class VolumetricInverse
 {
 public:
   void build(const PreconditionerData &data);
+  void persist(Archive &archive, const PreconditionerData &data);
   void vmult(TrilinosVector &result, const TrilinosVector &source) const;
 
 private:
@@ -139,9 +149,11 @@ public:
   /// `unknowns` must live as long as this.
   explicit BlockPreconditioner(const DisplacementUnknowns &unknowns);
   void build(const LinearSolver::BlockMatrix &matrix, const PreconditionerData &data) override;
+  void persist(Archive &archive, const LinearSolver::BlockMatrix &matrix) override;
   void vmult(LinearSolver::BlockVector &result, const LinearSolver::BlockVector &source) const override;
 
 private:
+  const TrilinosMatrix &stiffness() const { return data.shear ? *data.shear : matrix->block(0, 0); }
   /// p and pi = t + P p by elimination of t, the total pressure, from
   ///     [ -(W + S_t)   -W P           ] [t]   [f_pi            ]
   ///     [ -P^T W       -(E + P^T W P) ] [p] = [f_p + P^T f_pi  ]
@@ -154,6 +166,7 @@ private:
   std::vector<std::vector<double>> places;
   const LinearSolver::BlockMatrix *matrix = nullptr;
   PreconditionerData data;
+  std::vector<double> values; ///< of the stiffness that `displacement` was made of; by now it has others
   Multigrid displacement;
   VolumetricInverse volumetric;
   SchurInverse schur;

@@ -94,6 +94,19 @@ void LinearSolver::prepare(const BlockMatrix &new_matrix, const PreconditionerDa
   find_scaling();
 }
 
+void LinearSolver::persist(Archive &archive, const BlockMatrix &pattern, const bool keeps)
+{
+  archive.begin("linear solver");
+  if (keeps) {
+    if (archive.is_loading() && would_be_direct(pattern.m())) {
+      preconditioner = std::make_unique<DirectFactor>(purpose);
+      direct = true;
+    }
+    preconditioner->persist(archive, pattern);
+  }
+  archive(is_worn, fresh_iterations, n_builds);
+}
+
 void LinearSolver::build()
 {
   preconditioner->build(*matrix, data);

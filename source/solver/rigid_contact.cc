@@ -413,6 +413,13 @@ void RigidContact<dim>::constrain_carrying_velocity()
   this->change_carrying_velocity(continuum, noted);
 }
 
+template <int dim>
+void RigidContact<dim>::persist(Archive &archive)
+{
+  archive.begin("contact of a rigid body");
+  surface.persist(archive, continuum.nodes());
+}
+
 template class RigidContact<2>;
 template class RigidContact<3>;
 } // namespace peat

@@ -31,15 +31,25 @@ void RigidSites<dim>::choose(const ActiveNodes<dim> &nodes)
 {
   const double reach = margin * grid.smallest_cell_size();
   const Bounds<dim> bounds = rigid.bounds();
-  sites.clear();
-  site_of_node.assign(nodes.size(), no_index);
+  std::vector<std::uint32_t> chosen;
   for (std::uint32_t i = 0; i < nodes.size(); ++i) {
     const auto &x = nodes.position(i);
     bool inside = true;
     for (unsigned int d = 0; d < dim; ++d)
       inside = inside && x[d] > bounds.lower[d] - reach && x[d] < bounds.upper[d] + reach;
-    if (!inside || rigid.distance(x) > reach)
-      continue;
+    if (inside && rigid.distance(x) <= reach)
+      chosen.push_back(i);
+  }
+  take(nodes, chosen);
+  corners_of_choice = corners();
+}
+
+template <int dim>
+void RigidSites<dim>::take(const ActiveNodes<dim> &nodes, const std::vector<std::uint32_t> &chosen)
+{
+  sites.clear();
+  site_of_node.assign(nodes.size(), no_index);
+  for (const std::uint32_t i : chosen) {
     site_of_node[i] = sites.size();
     ContactSite<dim> site;
     site.second = i;
@@ -47,7 +57,17 @@ void RigidSites<dim>::choose(const ActiveNodes<dim> &nodes)
     sites.push_back(site);
   }
   near.choose(nodes, basis, bodies, site_of_node);
-  corners_of_choice = corners();
+}
+
+template <int dim>
+void RigidSites<dim>::persist(Archive &archive, const ActiveNodes<dim> &nodes)
+{
+  std::vector<std::uint32_t> chosen;
+  for (const ContactSite<dim> &site : sites)
+    chosen.push_back(site.second);
+  archive(chosen, corners_of_choice);
+  if (archive.is_loading())
+    take(nodes, chosen);
 }
 
 template <int dim>

@@ -34,6 +34,21 @@ bool Scene<dim>::is_saturated() const
 }
 
 template <int dim>
+void Scene<dim>::persist(Archive &archive)
+{
+  archive.begin("scene");
+  for (const auto &body : bodies)
+    archive(*body);
+  for (auto &[name, tracers] : surfaces)
+    archive(tracers);
+  if (probes)
+    archive(*probes);
+  for (const auto &rigid : rigid_bodies)
+    archive(*rigid);
+  archive(contact_states);
+}
+
+template <int dim>
 bool Scene<dim>::has_body_force() const
 {
   return std::any_of(conditions.begin(), conditions.end(),

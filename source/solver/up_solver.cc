@@ -65,7 +65,7 @@ template <int dim>
 UpSolver<dim>::~UpSolver() = default;
 
 template <int dim>
-void UpSolver<dim>::prepare()
+void UpSolver<dim>::number_unknowns()
 {
   std::vector<CellId> solid, saturated;
   const auto sort = [](std::vector<CellId> &cells) {
@@ -87,6 +87,12 @@ void UpSolver<dim>::prepare()
   unknowns.distribute(solid, saturated);
   active.rebuild(solid);
   contact.share_nodes(solid, active);
+}
+
+template <int dim>
+void UpSolver<dim>::prepare()
+{
+  number_unknowns();
   for (auto &[name, tracers] : scene.surfaces) {
     if (method != Method::finite_elements)
       tracers.settle(scene.body(name), active);

@@ -122,6 +122,23 @@ private:
   internal::SectionNode *node;
 };
 
+/// The value of an entry, as text.
+struct ParameterValue
+{
+  std::vector<std::string> sections; ///< from the top down
+  std::string key;
+  std::string value;
+  /// Words in it are names of constants: a function, a shape.
+  bool is_expression = false;
+  /// Of the section `Constants`.
+  bool is_constant = false;
+
+  /// "Bodies/ground/Shape"
+  std::string path() const;
+  /// Whether the name stands in an expression as a word of its own.
+  bool mentions(const std::string &name) const;
+};
+
 /// A parameter file in deal.II's format (subsection, set, end, include, comments, continuation lines) with
 /// what
 /// `--set` overrides.
@@ -144,6 +161,8 @@ public:
   /// The complete set of parameters as a parameter file that reproduces the run; expressions of numbers stand
   /// evaluated.
   void write_prm(std::ostream &out) const;
+  /// Of all entries that have been read; "(not set)" where absence has a meaning of its own.
+  std::vector<ParameterValue> values() const;
   /// The reference: every declared entry with meaning, unit, default and range.
   void write_markdown(std::ostream &out) const;
   void write_json(std::ostream &out) const;

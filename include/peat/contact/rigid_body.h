@@ -1,5 +1,6 @@
 #pragma once
 
+#include <peat/base/archive.h>
 #include <peat/base/parameters.h>
 #include <peat/grid/shape.h>
 
@@ -150,9 +151,8 @@ public:
   Vector last_force;
   Rotational last_moment;
 
-  /// All that changes in a run, in a fixed order; set_state() takes it back.
-  std::vector<double> state() const;
-  void set_state(const std::vector<double> &values);
+  /// What changes from step to step.
+  void persist(Archive &archive);
 
 private:
   /// About the centre, now.

@@ -44,6 +44,9 @@ public:
     }
   }
 
+  /// The planes of a step are where the next one begins.
+  void persist(Archive &archive) { archive(planes); }
+
   /// Unit vector from the first body to the second; zero where nothing separates them.
   dealii::Tensor<1, dim> normal(std::size_t site) const { return normal(site, n_stages - 1); }
 

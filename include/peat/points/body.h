@@ -1,5 +1,6 @@
 #pragma once
 
+#include <peat/base/archive.h>
 #include <peat/grid/active_nodes.h>
 #include <peat/grid/grid.h>
 #include <peat/grid/shape.h>
@@ -106,6 +107,9 @@ public:
   /// Take all points out, until enter() puts them where they were at the start. Collective.
   void withdraw();
   void enter();
+
+  /// All points, in the order in which they are stored. Collective.
+  void persist(Archive &archive);
 
   /// Check that the global number of points is what it was at the start.
   dealii::types::particle_index n_points_at_start() const { return initial_number; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <peat/base/archive.h>
 #include <peat/grid/active_nodes.h>
 #include <peat/grid/shape.h>
 #include <peat/grid/surface.h>
@@ -64,6 +65,12 @@ public:
   bool leaves_rank() const;
   /// Hand such tracers over. Collective.
   void migrate();
+
+  void persist(Archive &archive)
+  {
+    archive.begin("tracers");
+    archive(list);
+  }
 
 private:
   /// Shape functions at the position; if not `beyond_cell`, at the point of this cell that is nearest to it.

@@ -41,6 +41,8 @@ public:
   /// Compare histories with what the probes have just recorded; to be called after each ProbeWriter::write().
   void compare(const ProbeWriter<dim> &probes);
 
+  void persist(Archive &archive);
+
   struct Norms
   {
     double time = 0.;                   ///< of a comparison; of a history the last [s]

@@ -17,6 +17,7 @@ public:
 
   /// After a step of length dt that ended at this time. Collective.
   void note(double time, double dt, const Scene<dim> &scene);
+  void persist(Archive &archive) { archive(records); }
   /// At the end of a stage.
   void summarise(const Scene<dim> &scene);
 

@@ -1,7 +1,8 @@
 #pragma once
 
+#include <peat/simulation/growing_file.h>
+
 #include <chrono>
-#include <fstream>
 #include <string>
 
 namespace peat {
@@ -22,16 +23,19 @@ public:
   /// The same with a text of one's own; on a terminal only.
   void status(const std::string &text);
 
+  void persist(Archive &archive) { archive(file); }
+
 private:
   void end_progress();
   bool is_due();
   void show(const std::string &text);
 
-  std::ofstream file;
+  GrowingFile file;
   const bool active;
   const bool quiet;
   const bool terminal;
   bool progress_shown = false;
+  double first_fraction = -1.; ///< of progress; a run that goes on does not begin at 0
   const std::chrono::steady_clock::time_point start;
   std::chrono::steady_clock::time_point last_progress;
 };

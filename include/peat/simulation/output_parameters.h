@@ -29,6 +29,7 @@ struct OutputParameters
   bool pictures = true;            ///< whether solution.pvd is written at all
   double statistics_interval = 0.; ///< of statistics.csv [s]; 0: 200 lines a stage
   double probe_interval = 0.;      ///< of probes.csv [s]; 0: as statistics
+  double checkpoint_interval = 0.; ///< of checkpoints, wall-clock [min]; 0: only on a signal
 
   /// In a stage of this length, after what is 0 has been replaced [s].
   double statistics_interval_in(const double duration) const

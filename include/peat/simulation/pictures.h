@@ -26,6 +26,8 @@ public:
   /// Collective.
   void write(double time, const ActiveNodes<dim> &nodes, const NodalFields<dim> &fields);
   unsigned int n_written() const { return n_times; }
+  /// Reading writes the list of the pictures so far.
+  void persist(Archive &archive);
 
 private:
   struct Entry
@@ -34,6 +36,7 @@ private:
     unsigned int part;
     std::string name;
     std::string file;
+    void persist(Archive &archive) { archive(time, part, name, file); }
   };
 
   void write_grid(double time, const ActiveNodes<dim> &nodes, const NodalFields<dim> &fields);
@@ -54,6 +57,7 @@ private:
   {
     std::string file_name;
     unsigned int number;
+    void persist(Archive &archive) { archive(file_name, number); }
   };
   std::map<std::string, Part> parts;
   std::vector<Entry> entries;

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <peat/simulation/fields.h>
+#include <peat/simulation/growing_file.h>
 #include <peat/solver/explicit_mpm.h>
 
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -35,6 +35,7 @@ public:
   /// Of the last write(), the same on all ranks; NaN where there is no material or no such field.
   double value(const std::string &probe, const std::string &field) const;
   double time() const { return last_time; }
+  void persist(Archive &archive) { archive(file, last_time, values); }
 
 private:
   struct Probe
@@ -67,7 +68,7 @@ private:
   std::vector<std::string> units;
   std::vector<std::vector<FieldAccess>> access; ///< [body][field]
 
-  std::ofstream file;
+  GrowingFile file;
   double last_time;
   std::vector<double> values; ///< [probe][position, fields]
 };

@@ -11,6 +11,7 @@ struct RunOptions
   std::vector<std::string> overrides; ///< "Section/Key=value"
   std::string output;                 ///< directory; "" for output/NAME-OF-FILE
   bool quiet = false;
+  bool resume = false; ///< go on from the checkpoint in the directory
 };
 
 /// The words that concern a sweep.

@@ -1,8 +1,8 @@
 #pragma once
 
+#include <peat/simulation/growing_file.h>
 #include <peat/solver/totals.h>
 
-#include <fstream>
 #include <string>
 
 namespace peat {
@@ -16,9 +16,12 @@ public:
 
   void write(double time, unsigned long step, double dt, const std::string &limit, const Totals<dim> &totals,
              const Balances<dim> &balances);
+  void persist(Archive &archive) { archive(file); }
 
 private:
+  void write_header();
+
   const Scene<dim> &scene;
-  std::ofstream file;
+  GrowingFile file;
 };
 } // namespace peat

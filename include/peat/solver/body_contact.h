@@ -27,6 +27,7 @@ public:
   void note_late_forces() override;
   void constrain_flux() override;
   void constrain_carrying_velocity() override;
+  void persist(Archive &archive) override;
 
 private:
   using Vector = typename ContactPair<dim>::Vector;

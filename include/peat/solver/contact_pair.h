@@ -56,6 +56,9 @@ public:
   /// No approach of re-mapped velocities where there is contact.
   virtual void constrain_carrying_velocity() = 0;
 
+  /// What a step knows of the one before; the nodes have been matched.
+  virtual void persist(Archive &archive) = 0;
+
   const std::string &name() const { return parameters.name; }
   const ContactState<dim> &state() const { return now; }
 

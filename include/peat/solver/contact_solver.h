@@ -33,6 +33,8 @@ public:
   void finish(Ledger<dim> &book);
   void constrain_carrying_velocity();
 
+  void persist(Archive &archive);
+
   bool is_empty() const { return pairs.empty() && tied_pairs.empty(); }
   /// All sites stay as they are while pressures are solved for.
   void hold();

@@ -48,6 +48,9 @@ public:
   void book_balances(Ledger<dim> &book) const;
   void move_tracers();
 
+  /// What the next step knows of those before; the nodes are numbered.
+  void persist(Archive &archive);
+
   const std::vector<std::size_t> &bodies() const { return members; }
   const ActiveNodes<dim> &nodes() const { return active; }
   NodalFields<dim> &fields() { return nodal; }

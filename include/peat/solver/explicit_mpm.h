@@ -32,6 +32,7 @@ public:
   const ActiveNodes<dim> &nodes() const override;
   const NodalFields<dim> &fields() const override;
   const Ledger<dim> &ledger() const override { return book; }
+  void persist(Archive &archive) override;
 
 private:
   void find_flux();

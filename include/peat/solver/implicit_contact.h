@@ -34,6 +34,12 @@ public:
   bool enter();
   bool is_empty() const { return movers.empty(); }
 
+  /// Which rigid bodies act, and what of their motion steps go by; reading does what enter() does.
+  void persist(Archive &archive);
+  /// The nodes near rigid bodies. Reading takes the place of match_nodes().
+  void persist_nodes(Archive &archive, const ActiveNodes<dim> &nodes,
+                     const dealii::AffineConstraints<double> &held);
+
   // The nodes.
 
   /// Let ranks know the nodes that interfaces near their border need.
@@ -99,6 +105,8 @@ private:
   /// Whether the contact is of this rigid body, and of which bodies of the scene.
   std::vector<const Body<dim> *> partners(const ContactParameters<dim> &contact,
                                           const RigidBody<dim> &rigid) const;
+  void make_movers();
+  void find_line_couplings();
   void find_places(Touch &touch);
   void find_nodes(const ContactSite<dim> &site, Place &place) const;
   /// Penalty of a place [N/m].

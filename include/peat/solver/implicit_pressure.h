@@ -77,6 +77,9 @@ public:
   double fluid_squeezed() const { return squeezed; }
   unsigned long n_multigrids() const { return multigrids_made; }
 
+  /// What the next step knows of those before; the unknowns are numbered.
+  void persist(Archive &archive);
+
 private:
   using Vector = dealii::LinearAlgebra::distributed::Vector<double>;
   static constexpr unsigned int n_corners = 1u << dim;
@@ -97,6 +100,9 @@ private:
   void find_diagonal();
   /// Add a multiple of what it makes of these pressures.
   void add_stabilisation(const Vector &pressures, double factor, Vector &result) const;
+  /// The matrix that multigrid is made for: the couplings over faces alone.
+  void number_star();
+  void fill_star();
   void make_multigrid();
 
   // For the solution.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <peat/base/archive.h>
 #include <peat/base/parameters.h>
 
 #include <deal.II/base/point.h>
@@ -113,6 +114,12 @@ public:
   /// Solve from the initial guess in `solution`; returns the number of iterations. Throws a NumericalError on
   /// every rank if the tolerance is not reached. Collective.
   unsigned int solve(BlockVector &solution, const BlockVector &rhs);
+
+  /// What the next prepare() goes by. With `keeps`, that may be the preconditioner, which is written as what
+  /// it was made of, and made of that again: factors in the pattern of `matrix`; multigrid in place of one
+  /// that prepare() has made of other values, which leaves in `matrix` and data what it was made of.
+  /// Collective.
+  void persist(Archive &archive, const BlockMatrix &matrix, bool keeps);
 
   bool is_direct() const { return direct; }
   /// Whether a system of so many unknowns will be solved directly: what only a preconditioner needs then need

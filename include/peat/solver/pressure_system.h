@@ -31,6 +31,7 @@ public:
   /// nodes. Throws NumericalError on every rank if they do not converge. Collective.
   void solve();
   PressureWork work() const;
+  void persist(Archive &archive) { archive(n_solves, n_iterations); }
 
 private:
   using Member = ImplicitPressure<dim>;

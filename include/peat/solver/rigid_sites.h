@@ -23,6 +23,8 @@ public:
   void choose(const ActiveNodes<dim> &nodes);
   /// Whether the rigid body has moved so far that other nodes may matter.
   bool is_outdated() const;
+  /// The last choice.
+  void persist(Archive &archive, const ActiveNodes<dim> &nodes);
   /// Find normals, gaps and areas, and which sites act. Collective.
   /// @param has_mass whether a node has any
   void find(const ActiveNodes<dim> &nodes, const std::function<bool(std::uint32_t)> &has_mass);
@@ -39,6 +41,7 @@ private:
     dealii::Point<dim> place;           ///< on its surface
   };
 
+  void take(const ActiveNodes<dim> &nodes, const std::vector<std::uint32_t> &chosen);
   Corners corners() const;
   Approach approach(const typename NearPoints<dim>::PointData &point) const;
   /// Of a point alone.

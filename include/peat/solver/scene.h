@@ -46,6 +46,9 @@ struct Scene
   /// The body whose shape contained the place at the start, or -1.
   int body_at(const dealii::Point<dim> &x, double tolerance) const;
 
+  /// What moves and changes; conditions and contacts have no memory. Collective.
+  void persist(Archive &archive);
+
   /// Bodies (places in `bodies`) that move with one velocity field.
   std::vector<std::vector<std::size_t>> continua;
 };

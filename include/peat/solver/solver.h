@@ -1,5 +1,6 @@
 #pragma once
 
+#include <peat/base/archive.h>
 #include <peat/condition/nodal_fields.h>
 #include <peat/grid/active_nodes.h>
 #include <peat/solver/ledger.h>
@@ -18,5 +19,9 @@ public:
   virtual const ActiveNodes<dim> &nodes() const = 0;
   virtual const NodalFields<dim> &fields() const = 0;
   virtual const Ledger<dim> &ledger() const = 0;
+
+  /// What the next step depends on beside the scene. Reading takes the place of the preparations of a new
+  /// solver, after the scene has been read. Collective.
+  virtual void persist(Archive &archive) = 0;
 };
 } // namespace peat

@@ -76,6 +76,7 @@ public:
   const ActiveNodes<dim> &nodes() const override { return active; }
   const NodalFields<dim> &fields() const override { return nodal; }
   const Ledger<dim> &ledger() const override { return book; }
+  void persist(Archive &archive) override;
   const Space<dim> &space() const { return unknowns; }
 
   struct Work
@@ -85,6 +86,8 @@ public:
   const Work &work() const { return done; }
 
 private:
+  /// Of the cells that hold points now.
+  void number_unknowns();
   void resize();
   /// Find nodes with little or no mass. Collective.
   void survey_nodes();
