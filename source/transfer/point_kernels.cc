@@ -267,10 +267,7 @@ void PointKernels<dim, reach, saturated>::advance_and_remap(Body<dim> &body, con
       advance(body, batch, lane_weights, local_a, local_v, update, velocity);
       if (layout.velocity_gradient >= 0) {
         Lanes C[dim][dim];
-        for (unsigned int d = 0; d < dim; ++d) {
-          Lanes value;
-          interpolate<dim, reach>(local_v[d], lane_weights, value, C[d]);
-        }
+        fit_gradient(lane_weights, x, cell, local_v, C);
         if (spin)
           keep_spin(C);
         for (unsigned int d = 0; d < dim; ++d)
@@ -366,9 +363,12 @@ void PointKernels<dim, reach, saturated>::deform_batch(
 
   if (layout.velocity_gradient >= 0) {
     Lanes C[dim][dim];
-    for (unsigned int d = 0; d < dim; ++d)
-      for (unsigned int e = 0; e < dim; ++e)
-        C[d][e] = du[3 * d + e] * inverse_dt;
+    if constexpr (reach == 4)
+      fit_gradient(weights, x, cell, v, C);
+    else
+      for (unsigned int d = 0; d < dim; ++d)
+        for (unsigned int e = 0; e < dim; ++e)
+          C[d][e] = du[3 * d + e] * inverse_dt;
     if (spin_only)
       keep_spin(C);
     for (unsigned int d = 0; d < dim; ++d)

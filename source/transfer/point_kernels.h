@@ -90,6 +90,36 @@ private:
         local[c][i] = field[std::size_t(cell_nodes[i]) * n_components + c];
   }
 
+  /// The gradient that points bring to the nodes with their velocity: of the linear field that fits the
+  /// nodes' best, by their weights N (theory.md, equation 25a). With Q1 that is the gradient of the shape
+  /// functions.
+  static void fit_gradient(const Weights<dim, reach> &weights, const std::array<Lanes, dim> &x,
+                           const std::array<CellInterval, dim> &cell, const double (*v)[Chunks::n_nodes],
+                           Lanes (*C)[dim])
+  {
+    Weights<dim, reach> fit = weights;
+    if constexpr (reach == 4)
+      for (unsigned int d = 0; d < dim; ++d) {
+        const double lower = cell[d].lower, upper = lower + cell[d].size;
+        const double plane[4] = {lower - cell[d].size_below, lower, upper, upper + cell[d].size_above};
+        // The mean is not zero where the edge of the mesh cuts a domain.
+        Lanes mean = {}, square = {};
+        for (unsigned int k = 0; k < reach; ++k) {
+          const Lanes distance = plane[k] - x[d];
+          mean += weights[d].value[k] * distance;
+          square += weights[d].value[k] * distance * distance;
+        }
+        const double least = 1e-30 * cell[d].size * cell[d].size;
+        const Lanes inverse = 1. / max(square - mean * mean, broadcast(least));
+        for (unsigned int k = 0; k < reach; ++k)
+          fit[d].slope[k] = weights[d].value[k] * (plane[k] - x[d] - mean) * inverse;
+      }
+    for (unsigned int d = 0; d < dim; ++d) {
+      Lanes value;
+      interpolate<dim, reach>(v[d], fit, value, C[d]);
+    }
+  }
+
   /// Of the velocity gradient what is a rotation. The skew part of a shear is none: in a cell that is long in
   /// one direction it would put velocities across it that are larger than the shear itself.
   static void keep_spin(Lanes (*C)[dim])
