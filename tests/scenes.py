@@ -175,6 +175,15 @@ def s5_rigid_motion(c):
     c.below("rotating: angular momentum", abs(spin / start - 1.), 3e-2)
 
 
+def s8(c):
+    for transfer, shifts in ("aflip", (0.1, 0.6)), ("flip", (0.1,)):
+        for shift in shifts:
+            run = c.run("S8_short_waves", {"Constants/Shift": shift, "Explicit MPM/Transfer": transfer})
+            s = run.table("statistics.csv")
+            energy = [k + e for k, e in zip(s["kinetic energy"], s["elastic energy"])]
+            c.below("%s, shift %g: energy in the end" % (transfer, shift), energy[-1] / energy[0], 1.)
+
+
 def s5_rotation(c):
     for n in (500, 1000):
         run = c.run("S5_rotation", {"Constants/n": n})
@@ -441,6 +450,7 @@ CASES = {
     "S5_rigid_motion": (s5_rigid_motion, ("quick", "full"), 1),
     "S5_rotation": (s5_rotation, ("quick", "full"), 1),
     "S5_shear": (s5_shear, ("quick", "full"), 1),
+    "S8": (s8, ("quick", "full"), 2),
     "P1": (p1, ("quick", "full"), 5),
     "P1_late": (p1_late, ("full",), 20),
     "P1_3d": (p1_3d, ("full",), 10),
