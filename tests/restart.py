@@ -290,7 +290,7 @@ def refused(c):
     c.note("    its lines follow each other", all(a < b for a, b in zip(times, times[1:])), "%d lines" % len(times))
 
     def leave_rest():
-        for name in "step-7-rank-0", "index.json.tmp":
+        for name in "step-0-rank-0", "index.json.tmp":
             open(os.path.join(directory, "checkpoint", name), "w").write("half")
 
     attempt("what a crash leaves while a checkpoint is written", None, prepare=leave_rest)

@@ -367,7 +367,11 @@ void Simulation<dim>::plan_steps(const double event)
   // Between two events the step is constant, unless the stable step has changed by then.
   constexpr unsigned int steps_between_checks = 100;
   if (progress.steps_since_check >= steps_between_checks) {
-    progress.stable = explicit_solver->stable_step();
+    // Steps that go up and down with a limit make energy come and go: they grow only where it is worth while.
+    constexpr double worthwhile = 1.3;
+    const StableStep found = explicit_solver->stable_step();
+    if (found.dt < progress.stable.dt || found.dt > worthwhile * progress.stable.dt)
+      progress.stable = found;
     progress.steps_since_check = 0;
   }
   const StableStep &stable = progress.stable;
