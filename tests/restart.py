@@ -181,7 +181,6 @@ def implicit_more(c):
 
 def elements(c):
     check(c, "D3_ramp", FEM)
-    check(c, "L1_finite_strain_consolidation", FEM)
     check(c, "D3_ramp", dict(FEM, **dict(ITERATIVE, **{"Constants/cells": 10})))
 
 
