@@ -11,7 +11,8 @@ import sys
 from math import cos, exp, pi, radians, sin
 
 import scene_tools
-from contact_scenes import C_U, History, i2_errors, slope_of
+from contact_history import History
+from contact_scenes import C_U, i2_errors, slope_of
 from scene_tools import compare_tables
 
 IMPLICIT = {"Scheme": "implicit"}

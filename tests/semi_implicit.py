@@ -10,6 +10,7 @@ import sys
 
 import contact_scenes
 import scene_tools
+from contact_history import History
 
 IMPLICIT = {"Scheme": "semi-implicit"}
 TABLE = "reference/data/D3_ramp_%sup.csv"
@@ -146,7 +147,7 @@ def i2(c):
     # two steps; energy and momentum as ever.
     long = {"Output/Statistics interval": "4*h/c_u"}
     run, v_error, _ = contact_scenes.i2_errors(c, "I2_rigid_on_column", 1e-12, 80, long, lambda h: h)
-    s = contact_scenes.History(run, "impact")
+    s = History(run, "impact")
     energy = s.energy()
     c.below("long steps: velocity", v_error, 0.15)
     c.below("long steps: steps", run.summary["steps"], 70)
@@ -171,7 +172,7 @@ def against_explicit(c):
         found = {}
         for scheme in "explicit", "semi-implicit":
             run = c.run(scene, dict(settings, **{"Scheme": scheme, "Output/Pictures": "false"}))
-            found[scheme] = contact_scenes.History(run, "impact")
+            found[scheme] = History(run, "impact")
             c.below("%s, %s: momentum" % (scene, scheme), run.summary["balance"]["momentum"], 1e-12)
         s, known = found["semi-implicit"], found["explicit"]
         width = 20. * (known.t[1] - known.t[0])

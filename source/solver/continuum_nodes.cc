@@ -33,10 +33,10 @@ void Continuum<dim>::number_nodes(const std::vector<NodeId> &more_nodes)
       if (!open[b])
         for (const std::uint32_t i : active.on_boundary(b))
           closed_rows.push_back(std::size_t(i) * dim + b / 2);
-  if (extension) {
+  if (extension || pressure)
     find_prescribed_rows();
+  if (extension)
     extension->reinit(active, prescribed);
-  }
   if (!pressure)
     return;
   if (has_ties)
@@ -47,7 +47,6 @@ void Continuum<dim>::number_nodes(const std::vector<NodeId> &more_nodes)
       for (const Slice &slice : body(b).slices())
         cells.push_back(slice.cell);
   pressure->renumber(cells);
-  find_prescribed_rows();
   freedom.moves.assign(prescribed.size(), 1);
   for (std::size_t row = 0; row < prescribed.size(); ++row)
     freedom.moves[row] = !prescribed[row];
@@ -190,16 +189,14 @@ const std::vector<double> &Continuum<dim>::seen_by_points(const std::vector<doub
   return seen;
 }
 
-template void Continuum<2>::number_nodes(const std::vector<NodeId> &);
-template void Continuum<2>::find_prescribed_rows();
-template void Continuum<2>::find_small_nodes();
-template void Continuum<2>::extend_nodes();
-template const std::vector<double> &Continuum<2>::seen_by_points(const std::vector<double> &,
-                                                                 std::vector<double> &) const;
-template void Continuum<3>::number_nodes(const std::vector<NodeId> &);
-template void Continuum<3>::find_prescribed_rows();
-template void Continuum<3>::find_small_nodes();
-template void Continuum<3>::extend_nodes();
-template const std::vector<double> &Continuum<3>::seen_by_points(const std::vector<double> &,
-                                                                 std::vector<double> &) const;
+#define PEAT_INSTANTIATE(dim)                                                                                \
+  template void Continuum<dim>::number_nodes(const std::vector<NodeId> &);                                   \
+  template void Continuum<dim>::find_prescribed_rows();                                                      \
+  template void Continuum<dim>::find_small_nodes();                                                          \
+  template void Continuum<dim>::extend_nodes();                                                              \
+  template const std::vector<double> &Continuum<dim>::seen_by_points(const std::vector<double> &,            \
+                                                                     std::vector<double> &) const;
+PEAT_INSTANTIATE(2)
+PEAT_INSTANTIATE(3)
+#undef PEAT_INSTANTIATE
 } // namespace peat

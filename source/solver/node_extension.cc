@@ -135,7 +135,7 @@ void NodeExtension<dim>::find(const double *sums, const unsigned int stride, con
   sort_into_levels(found);
   if (is_empty())
     return;
-  std::vector<double> mass(active->size());
+  mass.resize(active->size());
   for (std::size_t i = 0; i < mass.size(); ++i)
     mass[i] = sums[i * stride];
   for (unsigned int l = n_levels; l-- > 0;) {
@@ -154,34 +154,34 @@ void NodeExtension<dim>::find(const double *sums, const unsigned int stride, con
 template <int dim>
 void NodeExtension<dim>::sort_into_levels(const std::vector<Line> &lines)
 {
-  for (auto &level : levels)
-    level.clear();
+  for (auto &lines_of_level : levels)
+    lines_of_level.clear();
   n_levels = !lines.empty();
   if (parallel)
     n_levels = dealii::Utilities::MPI::max(n_levels, active->grid().communicator());
   if (n_levels == 0)
     return;
-  std::vector<double> level(active->size(), 0.);
+  level_of.assign(active->size(), 0.);
   for (const Line &line : lines)
-    level[line.node[0]] = 1.;
-  active->max_over_ranks(level.data(), 1);
+    level_of[line.node[0]] = 1.;
+  active->max_over_ranks(level_of.data(), 1);
   for (unsigned int turn = 1; turn <= dim; ++turn) {
     bool changed = false;
-    std::vector<double> next = level;
+    next_level = level_of;
     for (const Line &line : lines)
       for (const std::uint32_t j : {line.node[1], line.node[2]})
-        if (j != no_index && level[j] + 1. > next[line.node[0]]) {
-          next[line.node[0]] = level[j] + 1.;
+        if (j != no_index && level_of[j] + 1. > next_level[line.node[0]]) {
+          next_level[line.node[0]] = level_of[j] + 1.;
           changed = true;
         }
-    level = next;
-    active->max_over_ranks(level.data(), 1);
+    level_of.swap(next_level);
+    active->max_over_ranks(level_of.data(), 1);
     if (!parallel && !changed)
       break;
   }
   // What would follow more nodes in a row than there are directions goes its own way.
   for (const Line &line : lines)
-    if (const auto l = static_cast<unsigned int>(level[line.node[0]]); l <= dim) {
+    if (const auto l = static_cast<unsigned int>(level_of[line.node[0]]); l <= dim) {
       levels[l - 1].push_back(line);
       n_levels = std::max(n_levels, l);
     }

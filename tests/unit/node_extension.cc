@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 
+#include "mpi_fixture.h"
 #include "section.h"
 
 // Nodes with next to no material follow the line through those behind them: a change of shape functions that
@@ -16,14 +17,6 @@
 using namespace peat;
 
 namespace {
-struct Mpi
-{
-  Mpi()
-      : init(boost::unit_test::framework::master_test_suite().argc,
-             boost::unit_test::framework::master_test_suite().argv, 1)
-  {}
-  dealii::Utilities::MPI::MPI_InitFinalize init;
-};
 BOOST_GLOBAL_FIXTURE(Mpi);
 
 /// The same on every rank, by where the node is.

@@ -4,8 +4,6 @@
 
 #include <peat/simulation/simulation.h>
 
-#include <deal.II/base/mpi.h>
-
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -13,18 +11,11 @@
 #include <sstream>
 #include <unistd.h>
 
+#include "mpi_fixture.h"
+
 using namespace peat;
 
 const MPI_Comm comm = MPI_COMM_WORLD;
-
-struct Mpi
-{
-  Mpi()
-      : init(boost::unit_test::framework::master_test_suite().argc,
-             boost::unit_test::framework::master_test_suite().argv, 1)
-  {}
-  dealii::Utilities::MPI::MPI_InitFinalize init;
-};
 
 inline unsigned int rank()
 {

@@ -7,6 +7,7 @@
 
 #include <random>
 
+#include "mpi_fixture.h"
 #include "section.h"
 
 // What nodes that are tied make of velocities: one value in the tied components, with their momentum, and
@@ -15,14 +16,6 @@
 using namespace peat;
 
 namespace {
-struct Mpi
-{
-  Mpi()
-      : init(boost::unit_test::framework::master_test_suite().argc,
-             boost::unit_test::framework::master_test_suite().argv, 1)
-  {}
-  dealii::Utilities::MPI::MPI_InitFinalize init;
-};
 BOOST_GLOBAL_FIXTURE(Mpi);
 
 const MPI_Comm comm = MPI_COMM_WORLD;

@@ -78,7 +78,9 @@ private:
   std::vector<Candidate> candidates;
   std::array<std::vector<Line>, dim> levels; ///< those of the first have nodes behind that are not small
   unsigned int n_levels = 0;                 ///< that any rank has
-  std::vector<Line> found;                   ///< here to keep its memory
+  // Of a step, here to keep their memory.
+  std::vector<Line> found;
+  std::vector<double> mass, level_of, next_level; ///< by node
   mutable std::vector<double> deltas, nodal;
 };
 } // namespace peat
